@@ -1,0 +1,98 @@
+//! The contract between a room and the shell that runs it.
+//!
+//! A stage is a pure function from message to message. The shell (`runtime`) waits, stamps, counts, sends and restarts;
+//! a room only computes. Nothing here knows of processes, clocks, files or shared memory.
+
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+
+pub use messages::{Message, Part, Verdict};
+use messages::{Sweep, Trace, Truth};
+
+/// One room of the chain. Touches no clock, file, thread or IPC.
+pub trait Stage: Sized {
+    /// The stage's name in chain.toml, on the command line and in reports.
+    const NAME: &'static str;
+    /// Its parameters as written in `config/stages/<name>.toml`.
+    type Params: DeserializeOwned;
+    /// What it takes.
+    type Input: Message;
+    /// What it gives.
+    type Output: Message;
+
+    /// Checks the parameters and allocates everything that the stage will ever use.
+    fn init(params: Self::Params) -> Result<Self, InitError>;
+
+    /// Fills `output`, which arrives empty. Never allocates, panics or fails: a bad part is a [`Verdict`].
+    fn process(&mut self, part: Part, input: &Self::Input, output: &mut Self::Output) -> Verdict;
+}
+
+/// Where sweeps come from.
+pub trait Source {
+    /// Fills `sweep` (and `truth`, where there is one) with the next sweep; both arrive empty.
+    fn next(&mut self, sweep: &mut Sweep, truth: &mut Truth) -> Result<Next, SourceError>;
+
+    /// Leaves out the next `sweeps` sweeps, as a restarted source must. `sweep` and `truth` are scratch space.
+    fn skip(&mut self, sweeps: u64, sweep: &mut Sweep, truth: &mut Truth) -> Result<(), SourceError> {
+        for _ in 0..sweeps {
+            sweep.clear();
+            truth.clear();
+            if self.next(sweep, truth)? == Next::End {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a source gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// A sweep.
+    Sweep,
+    /// The recording has ended; nothing was filled in.
+    End,
+}
+
+/// Whom a sink tells of every accepted part that is finished for good (written and flushed): in order, at once, from
+/// whatever thread.
+pub type Settled = Arc<dyn Fn(Part) + Send + Sync>;
+
+/// Where the chain ends. May own files and a writer thread; never makes the chain wait for them.
+pub trait Sink {
+    /// What it takes.
+    type Input: Message;
+
+    /// Takes over what it needs of a part; the message leaves shared memory when this returns.
+    /// Anything but a rejection means that [`Settled`] will be told of the part.
+    fn accept(&mut self, trace: &Trace, input: &Self::Input) -> Verdict;
+
+    /// Saves what must outlive a sudden death. Called about once a second.
+    fn checkpoint(&mut self) -> Result<(), SinkError>;
+
+    /// Finishes every accepted part and closes the files.
+    fn finish(&mut self) -> Result<(), SinkError>;
+}
+
+/// What a sink could not finish: one line that names file and remedy.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct SinkError(pub String);
+
+/// A source that cannot go on: one line that names file, place and remedy.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct SourceError(pub String);
+
+/// Why a stage cannot start: one line that names the key, its value and what it must be.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct InitError(Box<dyn std::error::Error + Send + Sync>);
+
+impl InitError {
+    /// Wraps a room's own error.
+    pub fn new(cause: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(cause))
+    }
+}
