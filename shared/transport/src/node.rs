@@ -1,0 +1,130 @@
+use std::time::Duration;
+
+use iceoryx2::node::CleanupState;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::{event, publish_subscribe};
+use messages::Message;
+
+use crate::wire::{Wire, WireTrace};
+use crate::{Inlet, Instance, Outlet, TransportError};
+
+pub(crate) type Ipc = ipc::Service;
+pub(crate) type Topic<T> = publish_subscribe::PortFactory<Ipc, Wire<T>, WireTrace>;
+pub(crate) type Wakeups = event::PortFactory<Ipc>;
+
+/// Readers of a topic: the next stage and two taps. Each adds its buffer to the shared memory bill.
+const MAX_SUBSCRIBERS: usize = 3;
+/// Processes that may have a topic open at once.
+const MAX_NODES: usize = 16;
+
+/// This process's place in an instance.
+pub struct Node {
+    node: iceoryx2::node::Node<Ipc>,
+    queue_parts: usize,
+}
+
+/// A service held open: as long as one lives the service exists.
+pub struct ServiceHold {
+    wake: Box<dyn Fn()>,
+}
+
+impl ServiceHold {
+    /// Wakes the readers of the topic without a message.
+    pub fn wake(&self) {
+        (self.wake)();
+    }
+}
+
+impl Node {
+    /// Joins an instance as `name`. `queue_parts` is the number of messages that wait for a slow reader before the
+    /// oldest is dropped; all processes of an instance must name the same.
+    pub fn join(instance: &Instance, name: &str, queue_parts: usize) -> Result<Self, TransportError> {
+        // A failure is returned and handled once; iceoryx2 would log it at every level it passes.
+        set_log_level(LogLevel::Fatal);
+        let fail = |cause: &dyn std::fmt::Debug| TransportError::new("join", instance.name(), cause);
+        let path = FilePath::new(instance.config_path().as_os_str().as_encoded_bytes()).map_err(|e| fail(&e))?;
+        // Dead nodes without details are cleaned with the global configuration, so it must be ours too.
+        let config = Config::setup_global_config_from_file(&path).map_err(|e| fail(&e))?;
+        let name = NodeName::new(name).map_err(|e| fail(&e))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Ipc>()
+            .map_err(|e| fail(&e))?;
+        Ok(Self { node, queue_parts })
+    }
+
+    /// Creates the service of a message type and holds it open. The supervisor's alone.
+    pub fn create<T: Message>(&self) -> Result<ServiceHold, TransportError> {
+        let fail = |cause: &dyn std::fmt::Debug| TransportError::new("create the service of", T::TYPE, cause);
+        let name = service_name::<T>()?;
+        let topic: Topic<T> = self
+            .node
+            .service_builder(&name)
+            .publish_subscribe::<Wire<T>>()
+            .user_header::<WireTrace>()
+            .max_publishers(1)
+            .max_subscribers(MAX_SUBSCRIBERS)
+            .max_nodes(MAX_NODES)
+            .subscriber_max_buffer_size(self.queue_parts)
+            .subscriber_max_borrowed_samples(2)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .create()
+            .map_err(|e| fail(&e))?;
+        let wakeups = self
+            .node
+            .service_builder(&name)
+            .event()
+            .max_notifiers(4)
+            .max_listeners(MAX_SUBSCRIBERS)
+            .max_nodes(MAX_NODES)
+            .create()
+            .map_err(|e| fail(&e))?;
+        let notifier = wakeups.notifier_builder().create().map_err(|e| fail(&e))?;
+        let wake = Box::new(move || {
+            let _kept = (&topic, &wakeups);
+            // A listener that is gone needs no waking.
+            let _ = notifier.notify();
+        });
+        Ok(ServiceHold { wake })
+    }
+
+    /// Opens the writing end of a service.
+    pub fn outlet<T: Message>(&self) -> Result<Outlet<T>, TransportError> {
+        let (topic, wakeups) = self.open::<T>()?;
+        Outlet::new(&topic, &wakeups)
+    }
+
+    /// Opens the reading end of a service.
+    pub fn inlet<T: Message>(&self) -> Result<Inlet<T>, TransportError> {
+        let (topic, wakeups) = self.open::<T>()?;
+        Inlet::new(topic, &wakeups, self.queue_parts)
+    }
+
+    fn open<T: Message>(&self) -> Result<(Topic<T>, Wakeups), TransportError> {
+        let fail = |cause: &dyn std::fmt::Debug| TransportError::new("open the service of", T::TYPE, cause);
+        let name = service_name::<T>()?;
+        let topic = self
+            .node
+            .service_builder(&name)
+            .publish_subscribe::<Wire<T>>()
+            .user_header::<WireTrace>()
+            .open()
+            .map_err(|e| fail(&e))?;
+        let wakeups = self.node.service_builder(&name).event().open().map_err(|e| fail(&e))?;
+        Ok((topic, wakeups))
+    }
+
+    /// Frees what dead processes of the instance held. The supervisor's alone, and only after the readers of a dead
+    /// publisher have drained it. Returns how many were cleaned and how many could not be.
+    pub fn clean_dead(&self, patience: Duration) -> (u64, u64) {
+        let CleanupState { cleanups, failed_cleanups } = self.node.blocking_cleanup_dead_nodes(patience);
+        (cleanups, failed_cleanups)
+    }
+}
+
+fn service_name<T: Message>() -> Result<ServiceName, TransportError> {
+    ServiceName::new(T::TYPE).map_err(|e| TransportError::new("name the service of", T::TYPE, e))
+}
