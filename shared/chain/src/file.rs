@@ -1,0 +1,46 @@
+use serde::{Deserialize, Serialize};
+
+/// `chain.toml` as written.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChainFile {
+    /// Sectors that a sweep travels as; 1 = whole sweeps.
+    pub sectors: u32,
+    /// Messages that wait for a slow reader before the oldest is dropped.
+    pub queue_parts: usize,
+    /// From the last return of a sweep to its last detection [ms].
+    pub deadline_ms: f64,
+    /// Restarts that a stage may have within `restart_window_s`; one more and the chain stops.
+    pub restarts: u32,
+    /// Length of that window [s].
+    pub restart_window_s: f64,
+    /// Where sweeps come from when `--from` says nothing else.
+    pub source: SourceFile,
+    /// The stages in flow order; the last is the sink.
+    #[serde(rename = "stage")]
+    pub stages: Vec<StageFile>,
+}
+
+/// The default source.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SourceFile {
+    /// A scene or a recording; its path is relative to chain.toml.
+    pub from: String,
+    /// Sweeps that a scene runs for when nobody asks for more or less.
+    pub sweeps: u64,
+}
+
+/// One stage as written.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageFile {
+    /// The stage's name, as in `encke stage NAME`.
+    pub name: String,
+    /// The message that it reads.
+    pub reads: String,
+    /// The message that it writes; none for the sink.
+    pub writes: Option<String>,
+    /// Its parameters, relative to chain.toml; none where it has none.
+    pub parameters: Option<String>,
+}

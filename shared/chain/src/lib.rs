@@ -1,0 +1,10 @@
+//! `chain.toml`, the topology: as written ([`ChainFile`]) and as checked ([`Chain`]).
+//!
+//! The chain is linear: a source, stages that each read what the one before writes, a sink. Nothing else can be said
+//! in the file, and what contradicts it is refused: a stage that skips one, a loop, a reader of the truth.
+
+mod check;
+mod file;
+
+pub use check::{Chain, ChainError, RestartBudget, Wired};
+pub use file::{ChainFile, SourceFile, StageFile};
