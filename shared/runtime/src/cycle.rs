@@ -1,0 +1,75 @@
+use messages::{Hop, Trace};
+use stage::Stage;
+use transport::{Outlet, Taken};
+
+use crate::reader::{Arrivals, Reader, serve};
+use crate::shell::WARM_UP_PARTS;
+use crate::{Shell, ShellError, clock};
+
+/// The main loop of every stage in the middle of the chain. Returns when the stage was asked to leave and has drained
+/// its input.
+pub fn run_stage<S: Stage>(stage: S, shell: &Shell) -> Result<(), ShellError> {
+    let node = shell.join()?;
+    let outlet = node.outlet::<S::Output>()?;
+    let inlet = node.inlet::<S::Input>()?;
+    shell.running();
+    serve(shell, &inlet, &mut Cycle { stage, shell, outlet, arrivals: Arrivals::new(shell) })?;
+    shell.left();
+    Ok(())
+}
+
+struct Cycle<'a, S: Stage> {
+    stage: S,
+    shell: &'a Shell,
+    outlet: Outlet<S::Output>,
+    arrivals: Arrivals<'a>,
+}
+
+impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
+    /// One part: receive → in hand → process → send → published → counted → out of hand → release.
+    fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
+        let Self { stage, shell, outlet, arrivals } = self;
+        let page = &shell.page;
+        let received_ns = clock::now_ns();
+        let mut trace: Trace = *taken.trace();
+        if !arrivals.receive(&trace) {
+            return Ok(());
+        }
+
+        let before_shell = (shell.allocations)();
+        let mut loan = outlet.loan()?;
+        let started_ns = clock::now_ns();
+        let before_process = (shell.allocations)();
+        let verdict = stage.process(trace.part, taken.message(), loan.message_mut());
+        let in_process = (shell.allocations)() - before_process;
+        shell.slow_down();
+        let finished_ns = clock::now_ns();
+
+        page.note_verdict(verdict);
+        trace.push(Hop {
+            sequence: page.published.get(),
+            free_ns: arrivals.free_ns,
+            received_ns,
+            started_ns,
+            finished_ns,
+            incarnation: shell.incarnation,
+            stage: shell.position,
+            verdict,
+            reserved: 0,
+        });
+        *loan.trace_mut() = trace;
+        loan.send()?;
+        page.count_sent(trace.part);
+        page.count_verdict(verdict);
+        page.put_down();
+
+        arrivals.parts += 1;
+        if arrivals.parts > WARM_UP_PARTS {
+            page.process_allocations.add(in_process);
+            page.shell_allocations.add((shell.allocations)() - before_shell - in_process);
+            page.counted_parts.add(1);
+        }
+        arrivals.free_ns = clock::now_ns();
+        Ok(())
+    }
+}

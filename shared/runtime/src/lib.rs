@@ -1,0 +1,27 @@
+//! The shell round a stage, written once: wait, stamp, process, send, count.
+//!
+//! [`run_stage`], [`run_source`] and [`run_sink`] are the three main loops. Each has the same order for a part, and the
+//! order is what makes the ledger close after a sudden death at any point (see [`page`]):
+//! receive → in hand → process → send → published → counted → out of hand → release.
+
+pub mod clock;
+mod cycle;
+mod error;
+pub mod logging;
+mod pacer;
+pub mod page;
+mod plan;
+mod reader;
+mod shell;
+mod shutdown;
+mod sink;
+mod source;
+mod window;
+
+pub use cycle::run_stage;
+pub use error::ShellError;
+pub use plan::{Outputs, Pace, Plan, SOURCE, SourcePlan};
+pub use shell::{AllocationCount, Shell};
+pub use shutdown::Shutdown;
+pub use sink::run_sink;
+pub use source::run_source;

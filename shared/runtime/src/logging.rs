@@ -1,0 +1,42 @@
+//! Events of all processes on stderr, one line each. The hot path logs nothing.
+
+use std::io;
+
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::fmt::time::FormatTime;
+
+use crate::clock;
+
+/// Host time in seconds, as in every trace.
+struct HostTime;
+
+impl FormatTime for HostTime {
+    fn format_time(&self, w: &mut Writer<'_>) -> std::fmt::Result {
+        let now_us = clock::now_ns() / 1_000;
+        write!(w, "{}.{:06}", now_us / 1_000_000, now_us % 1_000_000)
+    }
+}
+
+/// Sends events of `default_level` and above to stderr; `RUST_LOG` overrides the level.
+pub fn install(default_level: &str) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_level));
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(io::stderr)
+        .with_ansi(false)
+        .with_target(false)
+        .with_timer(HostTime)
+        .finish();
+    // Only tests install twice; the first stays.
+    let _ = tracing::subscriber::set_global_default(subscriber);
+}
+
+/// Makes a panic end the process at once, with its message as an event: a half-dead stage helps nobody.
+pub fn abort_on_panic() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        report(info);
+        std::process::abort();
+    }));
+}

@@ -1,0 +1,192 @@
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use messages::Verdict;
+
+/// Told apart from any other file, and from pages of another layout.
+pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg1");
+
+/// Gaps whose ordinals are kept by name; older ones are overwritten, their counts stay.
+pub(super) const MAX_GAPS: usize = 128;
+
+/// Where a stage is in its life.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u64)]
+pub enum State {
+    /// Never started, or between two lives.
+    #[default]
+    Absent = 0,
+    /// Started, not connected yet.
+    Starting = 1,
+    /// Connected; parts are taken as they come.
+    Running = 2,
+    /// A source that has nothing more to send.
+    Ended = 3,
+    /// Left in order.
+    Stopped = 4,
+}
+
+impl State {
+    /// The state's word in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Absent => "absent",
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Ended => "ended",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// A word of a page. Values only ever grow or are replaced; no reader needs two words to agree except where
+/// `ledger` says so.
+#[derive(Default)]
+#[repr(transparent)]
+pub struct Word(AtomicU64);
+
+impl Word {
+    /// The value.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// Replaces the value.
+    pub fn set(&self, value: u64) {
+        self.0.store(value, Ordering::Release);
+    }
+
+    /// Adds to the value; saturates, never wraps. For the single writer only.
+    pub fn add(&self, value: u64) {
+        self.set(self.get().saturating_add(value));
+    }
+
+    /// Adds to a value that other processes change too.
+    pub fn give(&self, value: u64) {
+        self.0.fetch_add(value, Ordering::AcqRel);
+    }
+
+    /// Takes one from a value that is not 0 and that other processes change too.
+    pub fn take_one(&self) -> bool {
+        self.0.fetch_update(Ordering::AcqRel, Ordering::Acquire, |value| value.checked_sub(1)).is_ok()
+    }
+}
+
+/// A gap in the parts of a hop, by name.
+#[derive(Default)]
+#[repr(C)]
+pub(super) struct GapWords {
+    pub(super) kind: Word,
+    pub(super) first_ordinal: Word,
+    pub(super) end_ordinal: Word,
+    pub(super) parts: Word,
+}
+
+/// The page. Zero bytes are the page of a stage that never ran.
+#[repr(C)]
+pub struct Page {
+    pub(super) magic: Word,
+
+    // Written by the stage.
+    /// Lives so far, this one included.
+    pub incarnation: Word,
+    /// Process of this life.
+    pub pid: Word,
+    /// A [`State`].
+    pub(super) state: Word,
+    /// Host time at which the working thread last turned its loop [ns].
+    pub heartbeat_ns: Word,
+    /// Parts taken from shared memory.
+    pub received: Word,
+    /// Sequence number expected next from the stage before.
+    pub next_sequence: Word,
+    /// One more than the last ordinal received.
+    pub next_ordinal_in: Word,
+    /// Parts processed, in full or in part.
+    pub processed: Word,
+    /// Parts rejected, by [`Verdict`].
+    pub rejected: [Word; 8],
+    /// Parts that the stage before published and that overflowed the queue here.
+    pub dropped: Word,
+    /// Parts that the stage before published and that died with a process.
+    pub lost: Word,
+    /// Parts published, through all lives (a sink: accepted, to be settled later).
+    pub published: Word,
+    /// One more than the last ordinal published (a sink: settled).
+    pub next_ordinal_out: Word,
+    /// Source only: one more than the sensor time of the run's first sweep [ns]; 0 = none yet.
+    pub began_sensor_ns: Word,
+    /// One more than the ordinal in hand; 0 = none.
+    pub in_hand: Word,
+    pub(super) in_hand_sequence: Word,
+    pub(super) in_hand_received: Word,
+    pub(super) in_hand_published: Word,
+    pub(super) in_hand_counted: Word,
+    pub(super) in_hand_rejected: Word,
+    pub(super) in_hand_verdict: Word,
+    /// Sink only: parts accepted in earlier lives that died before they were settled.
+    pub(super) lost_unsettled: Word,
+    /// The stage before has been drained up to this of its lives.
+    pub drained_incarnation: Word,
+    /// Heap allocations inside `process` after warm-up.
+    pub process_allocations: Word,
+    /// Heap allocations of the shell round it after warm-up.
+    pub shell_allocations: Word,
+    /// Parts over which those were counted.
+    pub counted_parts: Word,
+    pub(super) gap_pending: Word,
+    pub(super) gap_missing_before: Word,
+    pub(super) gap_sequence: Word,
+    pub(super) gap_count: Word,
+    pub(super) gaps: [GapWords; MAX_GAPS],
+
+    // Written by the supervisor.
+    /// The life whose account is settled: its successor may start.
+    pub settled_incarnation: Word,
+    /// Asks the stage to drain the stage before up to this of its lives.
+    pub drain_request: Word,
+    /// Parts of the stage before with a sequence number below this that are not in the queue are lost: they were sent
+    /// before this life was connected.
+    pub lose_below: Word,
+    /// Source only: 1 once all readers are connected.
+    pub may_start: Word,
+
+    // Written by `encke inject`.
+    /// Parts still to swallow.
+    pub swallow: Word,
+    /// Time added to each `process` [ns].
+    pub slow_ns: Word,
+}
+
+impl Page {
+    /// Where the stage is in its life.
+    pub fn state(&self) -> State {
+        match self.state.get() {
+            1 => State::Starting,
+            2 => State::Running,
+            3 => State::Ended,
+            4 => State::Stopped,
+            _ => State::Absent,
+        }
+    }
+
+    /// Sets where the stage is in its life.
+    pub fn set_state(&self, state: State) {
+        self.state.set(state as u64);
+    }
+
+    /// Shows that the working thread is alive at host time `now_ns`.
+    pub fn beat(&self, now_ns: u64) {
+        self.heartbeat_ns.set(now_ns);
+    }
+
+    /// Parts rejected for all reasons.
+    pub fn rejected_total(&self) -> u64 {
+        self.rejected.iter().map(Word::get).sum()
+    }
+
+    /// Parts rejected, by reason, where there are any.
+    pub fn rejected_by_reason(&self) -> impl Iterator<Item = (Verdict, u64)> + '_ {
+        let reasons = Verdict::ALL.into_iter().filter(|verdict| verdict.is_rejected());
+        reasons.map(|verdict| (verdict, self.rejected[verdict as usize].get())).filter(|(_, parts)| *parts > 0)
+    }
+}

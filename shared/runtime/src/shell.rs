@@ -1,0 +1,109 @@
+use std::time::Duration;
+
+use transport::{Instance, Node};
+
+use crate::page::{PageMap, State};
+use crate::{Plan, ShellError, Shutdown, clock};
+
+/// How long a stage started by hand waits for its instance, and a successor for the settlement of its predecessor.
+const PATIENCE_NS: u64 = 10_000_000_000;
+
+/// The longest sleep without a look at signals and requests.
+pub(crate) const IDLE: Duration = Duration::from_millis(50);
+
+/// Parts after which memory is warm and allocations are counted.
+pub(crate) const WARM_UP_PARTS: u64 = 20;
+
+/// Heap allocations of this process so far; the executable brings the counting allocator.
+pub type AllocationCount = fn() -> u64;
+
+/// What every stage's process has: its place in the instance, its page, its end.
+pub struct Shell {
+    pub(crate) name: String,
+    pub(crate) position: u16,
+    pub(crate) instance: Instance,
+    pub(crate) plan: Plan,
+    pub(crate) page: PageMap,
+    pub(crate) incarnation: u32,
+    pub(crate) shutdown: Shutdown,
+    pub(crate) allocations: AllocationCount,
+}
+
+impl Shell {
+    /// Waits for the instance's supervisor and reads its plan.
+    pub fn find_plan(instance: &Instance) -> Result<Plan, ShellError> {
+        if !clock::wait_for(PATIENCE_NS, || Plan::exists(instance)) {
+            return Err(ShellError::NoInstance(instance.name().to_owned()));
+        }
+        Plan::read(instance)
+    }
+
+    /// Begins a life of stage `name`: its predecessor's account is settled, its page is this process's from here on.
+    pub fn enter(instance: Instance, plan: Plan, name: &str, allocations: AllocationCount) -> Result<Self, ShellError> {
+        let shutdown = Shutdown::install(plan.supervisor_pid)?;
+        let page = PageMap::open(&Plan::page_path(&instance, name))?;
+        let before = page.incarnation.get();
+        let settled = || page.settled_incarnation.get() == before;
+        if !clock::wait_for(PATIENCE_NS, || settled() || shutdown.asked()) || !settled() {
+            return Err(ShellError::Unsettled(name.to_owned()));
+        }
+        let position = plan.stages().position(|stage| stage == name).unwrap_or(0) as u16;
+        page.pid.set(u64::from(std::process::id()));
+        page.set_state(State::Starting);
+        page.incarnation.set(before + 1);
+        page.beat(clock::now_ns());
+        Ok(Self {
+            name: name.to_owned(),
+            position,
+            instance,
+            plan,
+            page,
+            incarnation: before as u32 + 1,
+            shutdown,
+            allocations,
+        })
+    }
+
+    /// The run's plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The instance.
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
+    /// This life, counted from 1.
+    pub fn incarnation(&self) -> u32 {
+        self.incarnation
+    }
+
+    pub(crate) fn join(&self) -> Result<Node, ShellError> {
+        Ok(Node::join(&self.instance, &self.name, self.plan.chain.queue_parts)?)
+    }
+
+    pub(crate) fn running(&self) {
+        self.page.set_state(State::Running);
+        self.page.beat(clock::now_ns());
+        tracing::debug!(stage = self.name, incarnation = self.incarnation, "running");
+    }
+
+    /// Makes the cycle longer where a fault on purpose asks for it.
+    pub(crate) fn slow_down(&self) {
+        let slow_ns = self.page.slow_ns.get();
+        if slow_ns > 0 {
+            clock::sleep_ns(slow_ns);
+        }
+    }
+
+    /// Whether it is time to leave: asked to, or nobody is left to ask.
+    pub(crate) fn leaving(&self) -> bool {
+        self.shutdown.asked() || self.shutdown.orphaned()
+    }
+
+    pub(crate) fn left(&self) {
+        self.page.set_state(State::Stopped);
+        self.page.beat(clock::now_ns());
+    }
+}

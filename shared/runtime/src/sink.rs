@@ -1,0 +1,61 @@
+use std::sync::Arc;
+
+use stage::{Settled, Sink};
+use transport::Taken;
+
+use crate::reader::{Arrivals, Reader, serve};
+use crate::{Shell, ShellError, clock};
+
+/// Time between two checkpoints [ns].
+const CHECKPOINT_NS: u64 = 1_000_000_000;
+
+/// The main loop of the sink, which `start` makes. Returns when it was asked to leave, has drained its input and
+/// finished its files.
+pub fn run_sink<K: Sink>(
+    shell: Shell,
+    start: impl FnOnce(&Shell, Settled) -> Result<K, ShellError>,
+) -> Result<(), ShellError> {
+    let shell = Arc::new(shell);
+    let settling = Arc::clone(&shell);
+    let sink = start(&shell, Arc::new(move |part| settling.page.count_settled(part)))?;
+    let node = shell.join()?;
+    let inlet = node.inlet::<K::Input>()?;
+    shell.running();
+    let checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
+    let mut end = End { sink, shell: &shell, arrivals: Arrivals::new(&shell), checkpoint_ns };
+    serve(&shell, &inlet, &mut end)?;
+    let finished = end.sink.finish();
+    shell.left();
+    Ok(finished?)
+}
+
+struct End<'a, K: Sink> {
+    sink: K,
+    shell: &'a Shell,
+    arrivals: Arrivals<'a>,
+    checkpoint_ns: u64,
+}
+
+impl<K: Sink> Reader<K::Input> for End<'_, K> {
+    /// One part: receive → in hand → accept → counted → out of hand → release. Settled comes later, from the sink.
+    fn take(&mut self, taken: &Taken<K::Input>) -> Result<(), ShellError> {
+        if self.arrivals.receive(taken.trace()) {
+            let verdict = self.sink.accept(taken.trace(), taken.message());
+            self.shell.slow_down();
+            self.shell.page.count_accepted(verdict);
+            self.shell.page.put_down();
+        }
+        Ok(())
+    }
+
+    fn idle(&mut self) -> Result<(), ShellError> {
+        if clock::now_ns() >= self.checkpoint_ns {
+            self.checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
+            // A full disk costs statistics, not the chain.
+            if let Err(error) = self.sink.checkpoint() {
+                tracing::error!(stage = self.shell.name, %error, "statistics could not be saved");
+            }
+        }
+        Ok(())
+    }
+}
