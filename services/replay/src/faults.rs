@@ -1,0 +1,142 @@
+use std::path::Path;
+
+use crate::error::Place;
+
+/// What was found wrong in a recording and left out, while the rest is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(usize)]
+#[non_exhaustive]
+pub enum Fault {
+    /// A capture ends inside a record, or a record's length cannot be: the rest of the file is not read.
+    TornCapture,
+    /// A record whose frame cannot be taken apart, or that the snap length cut off.
+    BadFrame,
+    /// A data packet in which no block begins with the block flag.
+    NoBlock,
+    /// A block without its flag, or with an impossible azimuth, between good ones: its columns are unknown.
+    BadBlock,
+    /// Data packets that never arrived, by the stamps: their columns are unknown.
+    LostPacket,
+    /// A data packet that came twice or late.
+    LatePacket,
+    /// A data packet whose stamp is out of range or jumps.
+    BadStamp,
+    /// The sensor's clock or the recording jumps: the sweep ends there, incomplete.
+    Break,
+    /// A row or line that cannot be read; it keeps its place as a return that is not finite.
+    BadRow,
+    /// A file ends before the points that it promises, or inside one.
+    TornCloud,
+    /// A value of intensity outside 0 to 255, clamped.
+    Intensity,
+    /// A column of a table with a name that means nothing here.
+    UnknownColumn,
+    /// A file of a folder that cannot be read; it is passed over.
+    BadFile,
+    /// A file of a folder that is no recording.
+    OtherFile,
+}
+
+impl Fault {
+    /// All kinds.
+    pub const ALL: [Self; 14] = [
+        Self::TornCapture,
+        Self::BadFrame,
+        Self::NoBlock,
+        Self::BadBlock,
+        Self::LostPacket,
+        Self::LatePacket,
+        Self::BadStamp,
+        Self::Break,
+        Self::BadRow,
+        Self::TornCloud,
+        Self::Intensity,
+        Self::UnknownColumn,
+        Self::BadFile,
+        Self::OtherFile,
+    ];
+
+    /// The kind's word in logs and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::TornCapture => "torn_capture",
+            Self::BadFrame => "bad_frame",
+            Self::NoBlock => "no_block",
+            Self::BadBlock => "bad_block",
+            Self::LostPacket => "lost_packet",
+            Self::LatePacket => "late_packet",
+            Self::BadStamp => "bad_stamp",
+            Self::Break => "break",
+            Self::BadRow => "bad_row",
+            Self::TornCloud => "torn_cloud",
+            Self::Intensity => "intensity",
+            Self::UnknownColumn => "unknown_column",
+            Self::BadFile => "bad_file",
+            Self::OtherFile => "other_file",
+        }
+    }
+}
+
+/// Counts of each [`Fault`]; the first of a kind is also logged, with file and place.
+#[derive(Clone, Debug, Default)]
+pub struct Faults {
+    counts: [u64; Fault::ALL.len()],
+    /// After the first pass of a looped recording nothing new can be found.
+    closed: bool,
+}
+
+impl Faults {
+    /// How often `fault` was found.
+    pub fn count(&self, fault: Fault) -> u64 {
+        self.counts[fault as usize]
+    }
+
+    /// The kinds found, with their counts.
+    pub fn found(&self) -> impl Iterator<Item = (Fault, u64)> + '_ {
+        Fault::ALL.into_iter().map(|fault| (fault, self.count(fault))).filter(|&(_, count)| count > 0)
+    }
+
+    /// Counts and logs nothing.
+    pub(crate) fn muted() -> Self {
+        Self { closed: true, ..Self::default() }
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    pub(crate) fn close(&mut self) {
+        self.closed = true;
+    }
+
+    /// Counts `times` of `fault`.
+    pub(crate) fn note(&mut self, fault: Fault, times: u64, file: &Path, place: Place, what: impl std::fmt::Display) {
+        if self.closed {
+            return;
+        }
+        let count = &mut self.counts[fault as usize];
+        if *count == 0 {
+            let (file, fault) = (file.display(), fault.name());
+            tracing::warn!(%file, %place, fault, %what, "recording is not intact; further ones of this kind are only counted");
+        }
+        *count = count.saturating_add(times);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_stands_at_its_own_index_and_is_counted_there() {
+        let mut sut = Faults::default();
+        for (index, fault) in Fault::ALL.into_iter().enumerate() {
+            assert_eq!(fault as usize, index);
+            sut.note(fault, 2, Path::new("f"), Place::Byte(0), "x");
+        }
+        sut.close();
+        sut.note(Fault::BadRow, 1, Path::new("f"), Place::Line(1), "x");
+        assert!(sut.found().all(|(_, count)| count == 2));
+        assert_eq!(sut.found().count(), Fault::ALL.len());
+    }
+}

@@ -1,0 +1,31 @@
+//! Recorded data → Sweep: packet captures, tables and point clouds as a source of the chain.
+//!
+//! A recording is a file, or a folder of files of one format; the format is found by content. Geometry stays in the
+//! recording's own sensor frame (packets: x forward, y left, z up). What is intact is used; what is not is counted by
+//! reason, returns in the sweep's header, the rest in [`Faults`], and named once with file and place.
+//!
+//! ```
+//! use replay::{Options, open};
+//! let sensors = |_: &str| Err("no such sensor".into());
+//! let error = open("no/such/file.pcap".as_ref(), &Options::default(), &sensors).err().unwrap();
+//! assert!(error.to_string().starts_with("no/such/file.pcap: cannot be read"));
+//! ```
+
+mod capture;
+mod cloud;
+mod error;
+mod faults;
+mod files;
+mod format;
+mod intake;
+mod recording;
+mod table;
+mod time;
+mod velodyne;
+
+pub use error::{Place, ReplayError};
+pub use faults::{Fault, Faults};
+pub use format::{Format, UnknownFormat};
+pub use recording::{Options, Recording, SensorLookup, open};
+pub use table::TableWriter;
+pub use velodyne::{PacketWriter, PcapStamps, WriteError};
