@@ -1,0 +1,257 @@
+//! The cells round each cluster: what the firings beside its returns saw.
+
+use std::f32::consts::{PI, TAU};
+
+use lidar::{MAX_COLUMNS, MAX_RETURNS, MAX_RINGS};
+use messages::{Cell, CellKind, Cluster, Clusters, Sweep, Verdict};
+
+use crate::image::NOBODY;
+
+/// How far from a member a cell lies at most, in rings and in columns.
+const REACH: usize = 2;
+/// Columns from two before the sweep to two past it.
+const MOST_SPOTS: usize = MAX_COLUMNS + 2 * REACH;
+
+/// The other cells of a member's square as (rings, columns) away, nearest first.
+#[rustfmt::skip]
+const NEAREST_FIRST: [(isize, isize); 24] = [
+    (-1, 0), (0, -1), (0, 1), (1, 0),
+    (-1, -1), (-1, 1), (1, -1), (1, 1),
+    (-2, 0), (0, -2), (0, 2), (2, 0),
+    (-2, -1), (-2, 1), (-1, -2), (-1, 2), (1, -2), (1, 2), (2, -1), (2, 1),
+    (-2, -2), (-2, 2), (2, -2), (2, 2),
+];
+
+/// Finds the cells. Columns are numbered by *spot*: two before the sweep's first, so that those exist too.
+///
+/// A complete sweep wraps round: its first column follows its last. Cells past the ends of an incomplete one are
+/// `Unknown`; those past its end are numbered on, those before its start count down from `u16::MAX` and come first.
+///
+/// Where a firing gave several returns, the nearest is the cell's. It is judged against the member nearest in cells (by
+/// the sum of squares of rings and columns between; among equals the one with the smallest index): `Nearer` when its
+/// range is smaller, else `Farther`.
+pub(crate) struct Cells {
+    min_points: usize,
+    /// First return of each pixel, by ring and column.
+    pixel: Vec<u32>,
+    /// Next return of the same pixel.
+    next: Vec<u32>,
+    /// The cluster's members of each spot, a bit a ring; all zero between clusters.
+    members: Vec<u64>,
+    /// The spots with cells, a bit a spot; all zero between clusters.
+    spots: Vec<u64>,
+}
+
+impl Cells {
+    pub(crate) fn new(min_points: usize) -> Self {
+        Self {
+            min_points,
+            pixel: Vec::with_capacity(MAX_RINGS * MAX_COLUMNS),
+            next: Vec::with_capacity(MAX_RETURNS),
+            members: vec![0; MOST_SPOTS],
+            spots: vec![0; MOST_SPOTS.div_ceil(64)],
+        }
+    }
+
+    /// Adds the cells of all clusters of at least the minimum of points. Once those of a cluster do not fit, neither
+    /// it nor a later one gets any.
+    /// `cluster_of` has the number of each return's cluster.
+    pub(crate) fn fill(&mut self, sweep: &Sweep, cluster_of: &[u32], output: &mut Clusters) -> Verdict {
+        if !sweep.header.is_organised() || sweep.returns.is_empty() {
+            return Verdict::Complete;
+        }
+        self.index(sweep);
+        let mut field = Field::new(sweep, cluster_of);
+        for number in 0..output.clusters.len() {
+            let cluster = output.clusters[number];
+            if (cluster.summary.points as usize) < self.min_points {
+                continue;
+            }
+            field.cluster = number as u32;
+            let first = output.cells.len();
+            let fits = self.fill_cluster(&field, &cluster, output);
+            if !fits {
+                output.cells.truncate(first);
+                return Verdict::PartialCells;
+            }
+            output.clusters[number].first_cell = first as u32;
+            output.clusters[number].cells = (output.cells.len() - first) as u32;
+        }
+        Verdict::Complete
+    }
+
+    fn index(&mut self, sweep: &Sweep) {
+        let columns = sweep.columns.len();
+        self.pixel.clear();
+        self.pixel.resize(sweep.rings.len() * columns, NOBODY);
+        self.next.clear();
+        self.next.resize(sweep.returns.len(), NOBODY);
+        // From the back, so that each pixel's list runs in order of index.
+        for (place, r) in sweep.returns.iter().enumerate().rev() {
+            let pixel = &mut self.pixel[usize::from(r.ring) * columns + usize::from(r.column)];
+            self.next[place] = std::mem::replace(pixel, place as u32);
+        }
+    }
+
+    /// False when the message is full; then some of the cells are in it.
+    fn fill_cluster(&mut self, field: &Field, cluster: &Cluster, output: &mut Clusters) -> bool {
+        let places = cluster.summary.member_places();
+        let (mut low, mut high) = (usize::MAX, 0);
+        for r in &output.returns[places.clone()] {
+            let spot = usize::from(r.column) + REACH;
+            self.members[spot] |= 1 << r.ring;
+            for near in -(REACH as isize)..=REACH as isize {
+                let near = field.spot(spot, near);
+                self.spots[near / 64] |= 1 << (near % 64);
+                (low, high) = (low.min(near / 64), high.max(near / 64));
+            }
+        }
+        let mut fits = true;
+        for word in low..=high {
+            let mut bits = std::mem::take(&mut self.spots[word]);
+            while bits != 0 && fits {
+                fits = self.fill_spot(field, word * 64 + bits.trailing_zeros() as usize, output);
+                bits &= bits - 1;
+            }
+        }
+        for r in &output.returns[places] {
+            self.members[usize::from(r.column) + REACH] = 0;
+        }
+        fits
+    }
+
+    /// The cells of one column, by ring.
+    fn fill_spot(&self, field: &Field, spot: usize, output: &mut Clusters) -> bool {
+        let mut near = 0;
+        for columns in -(REACH as isize)..=REACH as isize {
+            near |= self.members_at(field, spot, columns);
+        }
+        let mut cells = (near | near << 1 | near << 2 | near >> 1 | near >> 2) & field.ring_bits & !self.members[spot];
+        while cells != 0 {
+            let cell = self.cell(field, spot, cells.trailing_zeros() as usize);
+            if output.cells.push(cell).is_err() {
+                return false;
+            }
+            cells &= cells - 1;
+        }
+        true
+    }
+
+    fn members_at(&self, field: &Field, spot: usize, columns: isize) -> u64 {
+        field.spot_if_any(spot, columns).map_or(0, |spot| self.members[spot])
+    }
+
+    fn cell(&self, field: &Field, spot: usize, ring: usize) -> Cell {
+        let azimuth_rad = field.azimuth_rad(spot, ring);
+        let cell = Cell {
+            azimuth_rad,
+            range_m: 0.0,
+            column: (spot as u16).wrapping_sub(REACH as u16),
+            ring: ring as u8,
+            kind: CellKind::Unknown,
+        };
+        let Some(column) = field.received(spot) else { return cell };
+        let there = self.returns_at(field, ring, column).map(|place| field.sweep.returns[place].range_m());
+        let Some(range_m) = there.min_by(f32::total_cmp) else { return Cell { kind: CellKind::Miss, ..cell } };
+        let member = self.nearest_member(field, spot, ring);
+        let nearer = member.is_some_and(|place| range_m < field.sweep.returns[place].range_m());
+        Cell { range_m, kind: if nearer { CellKind::Nearer } else { CellKind::Farther }, ..cell }
+    }
+
+    /// Place of the member nearest to a cell; of those equally near the smallest.
+    fn nearest_member(&self, field: &Field, spot: usize, ring: usize) -> Option<usize> {
+        let mut best: Option<(isize, usize)> = None;
+        for (rings, columns) in NEAREST_FIRST {
+            let distance = rings * rings + columns * columns;
+            if best.is_some_and(|(nearest, _)| distance > nearest) {
+                break;
+            }
+            let Some(ring) = ring.checked_add_signed(rings).filter(|&ring| ring < field.rings) else { continue };
+            if self.members_at(field, spot, columns) & (1 << ring) == 0 {
+                continue;
+            }
+            let Some(column) = field.spot_if_any(spot, columns).and_then(|spot| field.received(spot)) else { continue };
+            let place = self.returns_at(field, ring, column).find(|&place| field.cluster_of[place] == field.cluster);
+            best = best.into_iter().chain(place.map(|place| (distance, place))).min();
+        }
+        best.map(|(_, place)| place)
+    }
+
+    /// Places of the returns of a firing, in order.
+    fn returns_at(&self, field: &Field, ring: usize, column: usize) -> impl Iterator<Item = usize> {
+        let first = self.pixel[ring * field.columns + column];
+        std::iter::successors(Some(first), |&place| self.next.get(place as usize).copied())
+            .take_while(|&place| place != NOBODY)
+            .map(|place| place as usize)
+    }
+}
+
+/// The sweep as a field of cells.
+struct Field<'a> {
+    sweep: &'a Sweep,
+    /// Number of each return's cluster.
+    cluster_of: &'a [u32],
+    /// The cluster whose cells are sought.
+    cluster: u32,
+    rings: usize,
+    columns: usize,
+    ring_bits: u64,
+    /// +1 where azimuth rises with the column, −1 where it falls.
+    sense: f32,
+    /// The head's turn [rad/ns]; 0 where it is not known.
+    turn_rad_per_ns: f32,
+}
+
+impl<'a> Field<'a> {
+    fn new(sweep: &'a Sweep, cluster_of: &'a [u32]) -> Self {
+        let (rings, columns) = (sweep.rings.len(), sweep.columns.len());
+        let period_ns = sweep.header.period_ns;
+        Self {
+            sweep,
+            cluster_of,
+            cluster: 0,
+            rings,
+            columns,
+            ring_bits: u64::MAX >> (MAX_RINGS - rings),
+            sense: crate::turn::sense(&sweep.columns),
+            turn_rad_per_ns: if period_ns == 0 { 0.0 } else { TAU / period_ns as f32 },
+        }
+    }
+
+    /// The spot some columns away: round the turn where the sweep is complete, on past its ends where it is not.
+    fn spot(&self, spot: usize, columns: isize) -> usize {
+        let there = spot.saturating_add_signed(columns);
+        if !self.sweep.header.is_complete() {
+            return there;
+        }
+        // Turns are added so that two columns before the first one still count upwards.
+        (there + REACH * self.columns - REACH) % self.columns + REACH
+    }
+
+    /// As [`Field::spot`]; none where no spot is so far out.
+    fn spot_if_any(&self, spot: usize, columns: isize) -> Option<usize> {
+        let there = spot.checked_add_signed(columns).map(|_| self.spot(spot, columns))?;
+        (there < self.columns + 2 * REACH).then_some(there)
+    }
+
+    /// The column of a spot if it was received.
+    fn received(&self, spot: usize) -> Option<usize> {
+        let column = spot.checked_sub(REACH)?;
+        self.sweep.columns.get(column).filter(|column| column.valid != 0).map(|_| column)
+    }
+
+    /// Azimuth of a firing [rad] in [−π, π): its column's and the head's turn since the column's first firing. Past the
+    /// sweep's ends it goes on by the header's step. In an invalid column it is as good as the sweep's; 0 for none.
+    fn azimuth_rad(&self, spot: usize, ring: usize) -> f32 {
+        let column = spot.saturating_sub(REACH).min(self.columns - 1);
+        let beyond = spot as f32 - (column + REACH) as f32;
+        let turned_rad = self.turn_rad_per_ns * self.sweep.rings[ring].offset_ns as f32;
+        let on_rad = self.sense * (beyond * self.sweep.header.column_step_rad + turned_rad);
+        let azimuth_rad = (self.sweep.columns[column].azimuth_rad + on_rad + PI).rem_euclid(TAU) - PI;
+        match azimuth_rad {
+            finite if finite < PI => finite,
+            rounded_up if rounded_up.is_finite() => -PI,
+            _ => 0.0,
+        }
+    }
+}
