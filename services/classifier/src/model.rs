@@ -1,0 +1,171 @@
+use lidar::ObstacleClass;
+use messages::{Bin, Descriptors, MAX_CLUSTERS};
+
+use crate::svm::Sums;
+use crate::{
+    Card, CardError, Decision, MAX_CLASSES, Method, ModelFiles, NaiveBayes, NaiveBayesFileError, Svm, SvmFile,
+    SvmFileError,
+};
+
+/// A model ready to judge.
+#[derive(Clone, Debug)]
+pub enum Model {
+    /// Naive Bayes.
+    NaiveBayes(NaiveBayes),
+    /// Support vector machine.
+    Svm(SolidSvm),
+}
+
+/// A support vector machine whose labels are the four solids.
+#[derive(Clone, Debug)]
+pub struct SolidSvm {
+    svm: Svm,
+    /// The solid's place of each label.
+    solids: [usize; MAX_CLASSES],
+    /// Of each descriptor of a sweep.
+    sums: Vec<Sums>,
+}
+
+/// What a model says of one descriptor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    /// The verdict.
+    pub class: ObstacleClass,
+    /// Probability of each of [`ObstacleClass::SOLIDS`]; sums to 1.
+    pub posterior: [f32; 4],
+}
+
+/// Why a model is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Its card does not hold, or not for these bytes or this method.
+    #[error(transparent)]
+    Card(#[from] CardError),
+    /// The file is not text.
+    #[error("{0} is not UTF-8 text")]
+    NotText(String),
+    /// The file is no Naive Bayes model.
+    #[error("{0}: {1}")]
+    NaiveBayes(String, NaiveBayesFileError),
+    /// The file is no SVM model of ours.
+    #[error("{0}: {1}")]
+    Svm(String, SvmFileError),
+    /// The labels do not name the four solids.
+    #[error(
+        "{file}: label is {found:?}, must name each of 1 to 4 once (rectangular, ellipsoidal, cylindrical, conical)"
+    )]
+    Labels {
+        /// The model file.
+        file: String,
+        /// Its labels.
+        found: Vec<i32>,
+    },
+    /// The model cannot give a posterior.
+    #[error("{0} has no probA and probB, must be trained with probabilities")]
+    NoProbabilities(String),
+}
+
+impl Model {
+    /// Checks a model's files and makes it ready.
+    ///
+    /// # Errors
+    /// The first check that fails, cheapest first: card, kind, checksum, file.
+    pub fn load(method: Method, files: &ModelFiles) -> Result<Self, ModelError> {
+        let card = Card::parse(&files.card)?;
+        card.vouch(method, &files.model)?;
+        let file = card.file;
+        let Ok(text) = std::str::from_utf8(&files.model) else {
+            return Err(ModelError::NotText(file));
+        };
+        match method {
+            Method::NaiveBayes => match NaiveBayes::parse(text) {
+                Ok(model) => Ok(Self::NaiveBayes(model)),
+                Err(error) => Err(ModelError::NaiveBayes(file, error)),
+            },
+            Method::Svm => match SvmFile::parse(text) {
+                Ok(read) => Self::from_svm(file, Svm::new(&read)),
+                Err(error) => Err(ModelError::Svm(file, error)),
+            },
+        }
+    }
+
+    fn from_svm(file: String, svm: Svm) -> Result<Self, ModelError> {
+        let solid_of = |place: usize| {
+            let label = svm.labels().get(place).copied().unwrap_or(0);
+            ObstacleClass::SOLIDS.iter().position(|&solid| solid as i32 == label)
+        };
+        let mut solids = [0; MAX_CLASSES];
+        let mut named = [false; MAX_CLASSES];
+        for (place, solid) in solids.iter_mut().enumerate() {
+            match solid_of(place) {
+                Some(found) if !named[found] => {
+                    named[found] = true;
+                    *solid = found;
+                }
+                _ => return Err(ModelError::Labels { file, found: svm.labels().to_vec() }),
+            }
+        }
+        if !svm.has_probabilities() {
+            return Err(ModelError::NoProbabilities(file));
+        }
+        Ok(Self::Svm(SolidSvm { svm, solids, sums: vec![Sums::default(); MAX_CLUSTERS] }))
+    }
+
+    /// Judges a descriptor: at least one bin, indices under 1728 in rising order.
+    ///
+    /// Naive Bayes takes the most likely class, the SVM the one with the most votes; equals go to the first in the
+    /// paper's order (for the SVM: in the order of the file's labels).
+    pub fn judge(&self, bins: &[Bin]) -> Judgement {
+        match self {
+            Self::NaiveBayes(model) => from_naive_bayes(model, bins),
+            Self::Svm(model) => model.judgement(&model.svm.decide(bins)),
+        }
+    }
+
+    /// Judges every descriptor of a sweep that has bins, giving `each` its place and what [`Model::judge`] would say.
+    pub(crate) fn judge_all(&mut self, input: &Descriptors, mut each: impl FnMut(usize, Judgement)) {
+        let described = || {
+            input
+                .descriptors
+                .iter()
+                .enumerate()
+                .filter(|(_, d)| d.bins > 0)
+                .map(|(p, d)| (p, &input.bins[d.bin_places()]))
+        };
+        match self {
+            Self::NaiveBayes(model) => {
+                for (place, bins) in described() {
+                    each(place, from_naive_bayes(model, bins));
+                }
+            }
+            Self::Svm(model) => {
+                model.sums[..input.descriptors.len()].fill(Sums::default());
+                for tile in 0..model.svm.tiles() {
+                    for (place, bins) in described() {
+                        model.svm.add_to(&mut model.sums[place], tile, bins);
+                    }
+                }
+                for (place, _) in described() {
+                    each(place, model.judgement(&model.svm.decision(&model.sums[place])));
+                }
+            }
+        }
+    }
+}
+
+impl SolidSvm {
+    fn judgement(&self, decision: &Decision) -> Judgement {
+        let mut posterior = [0.0; 4];
+        for (place, probability) in self.svm.posterior(decision).into_iter().enumerate() {
+            posterior[self.solids[place]] = probability as f32;
+        }
+        Judgement { class: ObstacleClass::SOLIDS[self.solids[decision.winner]], posterior }
+    }
+}
+
+fn from_naive_bayes(model: &NaiveBayes, bins: &[Bin]) -> Judgement {
+    let posterior = model.posterior(bins);
+    let most = (1..4).fold(0, |most, q| if posterior[q] > posterior[most] { q } else { most });
+    Judgement { class: ObstacleClass::SOLIDS[most], posterior: posterior.map(|p| p as f32) }
+}

@@ -1,0 +1,62 @@
+use serde::{Deserialize, Serialize};
+
+/// `config/stages/classifier.toml`, as written, and the model that it names, as the shell read it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// Which classifier judges.
+    pub method: Method,
+    /// Name of the model: a folder of `config/models/`.
+    pub model: String,
+    /// The model's files; not in the TOML file. The shell fills them in before the stage starts.
+    #[serde(skip)]
+    pub files: Option<ModelFiles>,
+}
+
+/// The classifiers of Sec. V.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Naive Bayes, Eqs. 5 to 7.
+    NaiveBayes,
+    /// Support vector machine with a Gaussian kernel.
+    Svm,
+}
+
+impl Method {
+    /// The method's word in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NaiveBayes => "naive-bayes",
+            Self::Svm => "svm",
+        }
+    }
+}
+
+/// A model as it lies in its folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ModelFiles {
+    /// Text of `card.toml`.
+    pub card: String,
+    /// Bytes of the file that the card names.
+    pub model: Vec<u8>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_file_names_a_method_and_a_model() {
+        let params: Params = toml::from_str(include_str!("../../../config/stages/classifier.toml")).unwrap();
+        assert_eq!(params, Params { method: Method::Svm, model: "paper-svm".to_owned(), files: None });
+    }
+
+    #[test]
+    fn unknown_keys_and_methods_are_refused() {
+        let refused = |text| toml::from_str::<Params>(text).unwrap_err().to_string();
+        assert!(refused("method = \"svm\"\nmodel = \"m\"\ngamma = 3\n").contains("gamma"));
+        assert!(refused("method = \"svm\"\nmodel = \"m\"\nfiles = 3\n").contains("files"));
+        assert!(refused("method = \"forest\"\nmodel = \"m\"\n").contains("`naive-bayes` or `svm`"));
+    }
+}

@@ -1,0 +1,85 @@
+use messages::{Descriptors, Detection, Detections, Part, Verdict};
+use stage::{InitError, Stage};
+
+use crate::{BINS, Model, ModelError, Params};
+
+/// The stage: descriptors in, detections out.
+#[derive(Clone, Debug)]
+pub struct Classifier {
+    model: Model,
+}
+
+/// Why the classifier cannot start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClassifierError {
+    /// The shell gave no model.
+    #[error("files of model {0:?} were not given")]
+    NoFiles(String),
+    /// The model does not hold.
+    #[error("model {name:?}: {cause}")]
+    Model {
+        /// Its folder.
+        name: String,
+        /// What does not hold.
+        #[source]
+        cause: ModelError,
+    },
+}
+
+impl Stage for Classifier {
+    const NAME: &'static str = "classifier";
+    type Params = Params;
+    type Input = Descriptors;
+    type Output = Detections;
+
+    fn init(params: Params) -> Result<Self, InitError> {
+        let name = params.model;
+        let Some(files) = params.files else {
+            return Err(InitError::new(ClassifierError::NoFiles(name)));
+        };
+        match Model::load(params.method, &files) {
+            Ok(model) => Ok(Self { model }),
+            Err(cause) => Err(InitError::new(ClassifierError::Model { name, cause })),
+        }
+    }
+
+    fn process(&mut self, _part: Part, input: &Descriptors, output: &mut Detections) -> Verdict {
+        output.header = input.header;
+        if !is_well_formed(input) || output.members.extend_from_slice(&input.members).is_err() {
+            return Verdict::RejectedMalformed;
+        }
+        for descriptor in &input.descriptors {
+            // Cannot overflow: both messages hold as many.
+            let _ = output.detections.push(Detection { summary: descriptor.summary, ..Detection::default() });
+        }
+        let detections = &mut output.detections;
+        self.model.judge_all(input, |place, judgement| {
+            detections[place].class = judgement.class;
+            detections[place].posterior = judgement.posterior;
+        });
+        Verdict::Complete
+    }
+}
+
+/// Whether the descriptors part members and bins among them, in order, and every bin is one.
+fn is_well_formed(input: &Descriptors) -> bool {
+    let mut next_member: u64 = 0;
+    let mut next_bin: u64 = 0;
+    for descriptor in &input.descriptors {
+        let summary = descriptor.summary;
+        if u64::from(summary.first_member) != next_member || u64::from(descriptor.first_bin) != next_bin {
+            return false;
+        }
+        next_member += u64::from(summary.points);
+        next_bin += u64::from(descriptor.bins);
+    }
+    if next_member != input.members.len() as u64 || next_bin != input.bins.len() as u64 {
+        return false;
+    }
+    input.descriptors.iter().all(|descriptor| {
+        let bins = &input.bins[descriptor.bin_places()];
+        bins.is_sorted_by(|a, b| a.index < b.index)
+            && bins.iter().all(|bin| (bin.index as usize) < BINS && (0.0..=1.0).contains(&bin.weight))
+    })
+}
