@@ -1,0 +1,34 @@
+//! Offline: models are made and measured here, on the ground, with the very rooms that fly.
+//!
+//! [`train`] draws obstacles, has the simulator look at each of them alone, and the deployed clusterer and extractor
+//! describe what it saw; fits both classifiers of the paper; and tests them, loaded as the classifier will load them.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let read = |path: &str| std::fs::read_to_string(format!("config/{path}"));
+//! let plan: ground::TrainPlan = toml::from_str(&read("training/paper.toml")?)?;
+//! let trained = ground::train(&plan, &read, &mut |progress| eprintln!("{progress}"))?;
+//! trained.write_to(std::path::Path::new("config/models"))?;
+//! println!("{}", trained.report);
+//! # Ok(())
+//! # }
+//! ```
+
+mod confusion;
+mod fit_naive_bayes;
+mod fit_svm;
+mod observe;
+mod paper;
+mod parallel;
+mod plan;
+mod report;
+mod sets;
+mod svm_text;
+mod train;
+
+pub use confusion::Confusion;
+pub use observe::{Example, ObserveError, Observer, Seen, View};
+pub use paper::{Choice, Converged, Files, FourClass, Reproduction, RunNote, TwoClass, reproduce};
+pub use plan::{NaiveBayesPlan, PlanError, ReproductionPlan, SvmPlan, TrainPlan};
+pub use report::{ModelReport, TrainReport};
+pub use train::{Progress, TrainError, Trained, train};
