@@ -1,0 +1,176 @@
+//! Sweep → one JSON line. Numbers are the shortest that read back as the same value, so equal sweeps are equal bytes.
+
+use lidar::ObstacleClass;
+use messages::{Detection, Refusal};
+use serde::ser::{SerializeMap, SerializeSeq};
+use serde::{Serialize, Serializer};
+
+use crate::assemble::SweepRows;
+
+/// Appends the sweep's line, its end included. Clusters are numbered by their place, which is their rank by key.
+pub(crate) fn write_line(sweep: &SweepRows, line: &mut Vec<u8>) -> Result<(), serde_json::Error> {
+    serde_json::to_writer(
+        &mut *line,
+        &Line {
+            sweep: sweep.part.sweep,
+            complete: sweep.complete,
+            sensor_time_ns: sweep.part.sensor_time_ns,
+            returns: sweep.accepted,
+            refused: Refused(&sweep.refused),
+            missing_sectors: sweep.missing_sectors,
+            rejected_sectors: sweep.rejected_sectors,
+            detections: Rows(&sweep.detections),
+        },
+    )?;
+    line.push(b'\n');
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    sweep: u64,
+    complete: bool,
+    sensor_time_ns: u64,
+    returns: u64,
+    refused: Refused<'a>,
+    #[serde(skip_serializing_if = "is_zero")]
+    missing_sectors: u32,
+    #[serde(skip_serializing_if = "is_zero")]
+    rejected_sectors: u32,
+    detections: Rows<'a>,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+/// Reasons that occurred, in their order.
+struct Refused<'a>(&'a [u64; Refusal::ALL.len()]);
+
+impl Serialize for Refused<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for (reason, &count) in Refusal::ALL.into_iter().zip(self.0) {
+            if count > 0 {
+                map.serialize_entry(reason.name(), &count)?;
+            }
+        }
+        map.end()
+    }
+}
+
+struct Rows<'a>(&'a [Detection]);
+
+impl Serialize for Rows<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut rows = serializer.serialize_seq(Some(self.0.len()))?;
+        for (cluster, detection) in self.0.iter().enumerate() {
+            rows.serialize_element(&Row::new(cluster, detection))?;
+        }
+        rows.end()
+    }
+}
+
+#[derive(Serialize)]
+struct Row {
+    cluster: usize,
+    points: u32,
+    class: ObstacleClass,
+    posterior: Option<Posterior>,
+    centroid_m: [f32; 3],
+    /// The solid's pose and size: null until a solid is fitted.
+    centre_m: Option<[f32; 3]>,
+    size_m: Option<[f32; 3]>,
+    attitude_wxyz: Option<[f32; 4]>,
+    range_m: f32,
+    rings: u32,
+}
+
+impl Row {
+    fn new(cluster: usize, detection: &Detection) -> Self {
+        let [rectangular, ellipsoidal, cylindrical, conical] = detection.posterior;
+        let posterior = Posterior { rectangular, ellipsoidal, cylindrical, conical };
+        Self {
+            cluster,
+            points: detection.summary.points,
+            class: detection.class,
+            posterior: detection.class.solid_index().map(|_| posterior),
+            centroid_m: detection.summary.centroid_m,
+            centre_m: None,
+            size_m: None,
+            attitude_wxyz: None,
+            range_m: detection.summary.range_m(),
+            rings: detection.summary.rings,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Posterior {
+    rectangular: f32,
+    ellipsoidal: f32,
+    cylindrical: f32,
+    conical: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::{ClusterSummary, Part};
+
+    use super::*;
+
+    fn line(sweep: &SweepRows) -> String {
+        let mut line = Vec::new();
+        write_line(sweep, &mut line).unwrap();
+        String::from_utf8(line).unwrap()
+    }
+
+    #[test]
+    fn a_sweep_without_obstacles_has_an_empty_list() {
+        let sweep = SweepRows { part: Part { sweep: 7, ..Part::default() }, complete: true, ..SweepRows::default() };
+        assert_eq!(
+            line(&sweep),
+            "{\"sweep\":7,\"complete\":true,\"sensor_time_ns\":0,\"returns\":0,\"refused\":{},\"detections\":[]}\n"
+        );
+    }
+
+    #[test]
+    fn every_field_of_a_line_stands_where_the_format_says() {
+        let conical = Detection {
+            summary: ClusterSummary {
+                key: 3,
+                points: 123,
+                rings: 4,
+                centroid_m: [3.0, -4.0, 0.1],
+                ..ClusterSummary::default()
+            },
+            posterior: [0.01, 0.02, 0.07, 0.9],
+            class: ObstacleClass::Conical,
+            reserved: [0; 3],
+        };
+        let unclassified = Detection {
+            summary: ClusterSummary { key: 9, points: 1, rings: 1, centroid_m: [0.0, 2.0, 0.0], ..conical.summary },
+            ..Detection::default()
+        };
+        let sweep = SweepRows {
+            part: Part { sweep: 1, sensor_time_ns: 18_446_744_073_709_551_615, ..Part::default() },
+            accepted: 124,
+            refused: [2, 0, 1, 0, 0],
+            missing_sectors: 1,
+            rejected_sectors: 2,
+            detections: vec![conical, unclassified],
+            ..SweepRows::default()
+        };
+        let expected = concat!(
+            r#"{"sweep":1,"complete":false,"sensor_time_ns":18446744073709551615,"returns":124,"#,
+            r#""refused":{"not_finite":2,"too_near":1},"missing_sectors":1,"rejected_sectors":2,"detections":["#,
+            r#"{"cluster":0,"points":123,"class":"conical","#,
+            r#""posterior":{"rectangular":0.01,"ellipsoidal":0.02,"cylindrical":0.07,"conical":0.9},"#,
+            r#""centroid_m":[3.0,-4.0,0.1],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":5.001,"rings":4},"#,
+            r#"{"cluster":1,"points":1,"class":"unclassified","posterior":null,"#,
+            r#""centroid_m":[0.0,2.0,0.0],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":2.0,"rings":1}]}"#,
+            "\n"
+        );
+        assert_eq!(line(&sweep), expected);
+    }
+}

@@ -1,0 +1,60 @@
+//! The chain's ledgered sink: one JSON line of detections a sweep, one CSV row of labels a return, and the latency
+//! statistics of every hop.
+//!
+//! [`Recorder`] copies each part into a buffer and hands it to one writer thread; a slow or full disk costs rows,
+//! never time. It reads no clock: every time is in the [`messages::Trace`].
+//!
+//! ```
+//! use std::sync::Arc;
+//! use std::sync::atomic::{AtomicU64, Ordering};
+//!
+//! use messages::{Detections, Trace};
+//! use recorder::{Recorder, Settings, Snapshot};
+//! use stage::Sink;
+//! use zerocopy::FromZeros;
+//!
+//! let settings = Settings {
+//!     detections: Some("/dev/null".into()),
+//!     labels: None,
+//!     statistics: None,
+//!     resume: false,
+//!     queue_parts: 4,
+//!     lossless: true,
+//!     paced: false,
+//!     deadline_ms: 100.0,
+//!     stages: vec!["simulator".into(), "clusterer".into(), "extractor".into(), "classifier".into()],
+//! };
+//! let settled = Arc::new(AtomicU64::new(0));
+//! let counter = Arc::clone(&settled);
+//! let tell = Arc::new(move |_part| _ = counter.fetch_add(1, Ordering::Release));
+//! let mut recorder = Recorder::start(settings, tell)?;
+//! let empty = Detections::new_box_zeroed().unwrap(); // tests only; stages get shared memory
+//! assert!(!recorder.accept(&Trace::default(), &empty).is_rejected());
+//! recorder.finish()?;
+//! assert_eq!(settled.load(Ordering::Acquire), 1);
+//! let mut snapshot = Snapshot::default();
+//! recorder.snapshot_into(&mut snapshot);
+//! assert_eq!(snapshot.sweeps, 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod assemble;
+mod detections_json;
+mod labels_csv;
+mod latency;
+mod output;
+mod part_rows;
+mod recorder;
+mod repair;
+mod segments;
+mod settings;
+mod snapshot;
+mod stats;
+mod worst;
+mod writer;
+
+pub use latency::{LatencySnapshot, Percentiles};
+pub use recorder::Recorder;
+pub use settings::{MAX_QUEUE_PARTS, RecorderError, Settings};
+pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, VERSION};
+pub use worst::WorstSweep;

@@ -1,0 +1,62 @@
+use messages::{Detection, Detections, MAX_CLUSTERS, Part, SweepHeader, Trace};
+
+/// What the writer needs of one part, copied out of shared memory into a buffer made at the start.
+pub(crate) struct PartRows {
+    pub(crate) part: Part,
+    pub(crate) header: SweepHeader,
+    /// Whether a stage rejected the part: its output is empty and says nothing of its returns.
+    pub(crate) rejected: bool,
+    pub(crate) detections: Vec<Detection>,
+    /// Empty where no labels are written.
+    pub(crate) members: Vec<u32>,
+}
+
+impl PartRows {
+    /// Reserves room for the largest part, so that filling never allocates.
+    pub(crate) fn reserved(members: bool) -> Self {
+        Self {
+            part: Part::default(),
+            header: SweepHeader::default(),
+            rejected: false,
+            detections: Vec::with_capacity(MAX_CLUSTERS),
+            members: Vec::with_capacity(if members { MAX_CLUSTERS } else { 0 }),
+        }
+    }
+
+    pub(crate) fn fill(&mut self, trace: &Trace, input: &Detections, members: bool) {
+        self.part = trace.part;
+        self.header = input.header;
+        self.rejected = is_rejected(trace);
+        self.detections.clear();
+        self.detections.extend_from_slice(&input.detections);
+        self.members.clear();
+        if members {
+            self.members.extend_from_slice(&input.members);
+        }
+    }
+}
+
+/// Whether a stage of the chain rejected the part.
+pub(crate) fn is_rejected(trace: &Trace) -> bool {
+    trace.hops().iter().any(|hop| hop.verdict.is_rejected())
+}
+
+/// Whether a message does not contradict itself: every cluster's places lie in `members`, and the members of a whole
+/// sweep are as many as its accepted returns and lie among its recorded ones. A rejected part promises nothing of
+/// its members; those of a sector can be judged only with the sweep (see [`crate::assemble`]).
+pub(crate) fn is_coherent(trace: &Trace, input: &Detections) -> bool {
+    let members = input.members.len() as u64;
+    let in_place = |d: &Detection| {
+        d.summary.points > 0 && u64::from(d.summary.first_member) + u64::from(d.summary.points) <= members
+    };
+    if !input.detections.iter().all(in_place) {
+        return false;
+    }
+    if trace.part.sectors > 1 || is_rejected(trace) {
+        return true;
+    }
+    let points = input.detections.iter().map(|detection| u64::from(detection.summary.points)).sum::<u64>();
+    points == members
+        && members == u64::from(input.header.accepted())
+        && input.members.iter().all(|&index| index < input.header.recorded)
+}

@@ -1,0 +1,181 @@
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::{Builder, JoinHandle};
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use messages::{Detections, Trace, Verdict};
+use stage::{Settled, Sink, SinkError};
+
+use crate::output::{Commit, Failure, Output};
+use crate::part_rows::{PartRows, is_coherent};
+use crate::repair;
+use crate::settings::{RecorderError, Settings};
+use crate::snapshot::Snapshot;
+use crate::stats::Statistics;
+use crate::writer::{Progress, Writer};
+
+/// The chain's ledgered sink: detections and labels as files, latencies as statistics.
+///
+/// Dropping it without [`Sink::finish`] does not wait: the writer ends by itself when it has written what it was given.
+pub struct Recorder {
+    statistics: Statistics,
+    /// The way to the writer; none when nothing is written, or after `finish`.
+    line: Option<Line>,
+    progress: Arc<Progress>,
+    lossless: bool,
+    with_members: bool,
+    finished: bool,
+    statistics_file: Option<PathBuf>,
+    /// Memory that is used again for every checkpoint.
+    snapshot: Snapshot,
+}
+
+/// Buffers go round: from `free`, filled, into `queue`, and back when they are written.
+struct Line {
+    queue: Sender<Box<PartRows>>,
+    free: Receiver<Box<PartRows>>,
+    writer: JoinHandle<Vec<Failure>>,
+}
+
+impl Recorder {
+    /// Opens the files, allocates every buffer and starts the writer thread (none where there is no file).
+    ///
+    /// With `resume`, what a killed process left torn at a file's end is cut, and writing goes on from there.
+    /// A named pipe is opened when the first sweep is written, because opening waits for a reader.
+    ///
+    /// # Errors
+    /// A setting out of range, a file that cannot be written, one to go on with that is not the recorder's.
+    pub fn start(settings: Settings, settled: Settled) -> Result<Self, RecorderError> {
+        settings.check()?;
+        let statistics = Statistics::new(&settings)?;
+        let progress = Arc::new(Progress::new(settled));
+        let (detections, labels) = open_outputs(&settings)?;
+        let with_members = labels.is_some();
+        let line = if detections.is_none() && labels.is_none() {
+            None
+        } else {
+            let writer = Writer { detections, labels, progress: Arc::clone(&progress) };
+            Some(Line::start(writer, settings.queue_parts, with_members)?)
+        };
+        Ok(Self {
+            statistics,
+            line,
+            progress,
+            lossless: settings.lossless,
+            with_members,
+            finished: false,
+            statistics_file: settings.statistics,
+            snapshot: Snapshot::default(),
+        })
+    }
+
+    /// Copies the statistics so far into `snapshot`, whose memory is used again.
+    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
+        self.statistics.snapshot_into(snapshot);
+        snapshot.lost_sweeps.detections = self.progress.lost_detections.load(Ordering::Relaxed);
+        snapshot.lost_sweeps.labels = self.progress.lost_labels.load(Ordering::Relaxed);
+    }
+
+    fn take(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+        if !is_coherent(trace, input) {
+            return Verdict::RejectedMalformed;
+        }
+        if self.finished {
+            return Verdict::RejectedSinkFull;
+        }
+        let Some(line) = &self.line else {
+            (self.progress.settled)(trace.part);
+            return Verdict::Complete;
+        };
+        let buffer = if self.lossless { line.free.recv().ok() } else { line.free.try_recv().ok() };
+        let Some(mut rows) = buffer else { return Verdict::RejectedSinkFull };
+        rows.fill(trace, input, self.with_members);
+        // The queue holds as many parts as there are buffers, so only a dead writer refuses.
+        match line.queue.try_send(rows) {
+            Ok(()) => Verdict::Complete,
+            Err(_) => Verdict::RejectedSinkFull,
+        }
+    }
+}
+
+impl Line {
+    fn start(writer: Writer, parts: usize, with_members: bool) -> Result<Self, RecorderError> {
+        let (queue, queued) = bounded(parts);
+        let (freed, free) = bounded(parts);
+        for _ in 0..parts {
+            // Cannot fail: there is room for all, and `free` is alive.
+            let _ = freed.try_send(Box::new(PartRows::reserved(with_members)));
+        }
+        let writer = Builder::new()
+            .name("recorder-writer".to_owned())
+            .spawn(move || writer.run(queued, freed))
+            .map_err(RecorderError::Thread)?;
+        Ok(Self { queue, free, writer })
+    }
+}
+
+impl Sink for Recorder {
+    type Input = Detections;
+
+    /// Counts the part, copies its rows into a free buffer and passes it on. Never waits unless `lossless`.
+    ///
+    /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members out of place.
+    fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+        let verdict = self.take(trace, input);
+        self.statistics.add(trace, input, verdict);
+        verdict
+    }
+
+    /// Writes the statistics so far, where the settings name a file for them.
+    fn checkpoint(&mut self) -> Result<(), SinkError> {
+        let Some(path) = &self.statistics_file else { return Ok(()) };
+        let mut snapshot = std::mem::take(&mut self.snapshot);
+        self.snapshot_into(&mut snapshot);
+        let written = snapshot.write(path).map_err(|error| SinkError(error.to_string()));
+        self.snapshot = snapshot;
+        written
+    }
+
+    /// Waits until everything is written: for as long as a pipe's reader takes. A second call does nothing.
+    fn finish(&mut self) -> Result<(), SinkError> {
+        self.finished = true;
+        let Some(Line { queue, free, writer }) = self.line.take() else { return self.checkpoint() };
+        drop(queue);
+        let failures = writer.join().map_err(|_| SinkError("the recorder's writer thread panicked".to_owned()))?;
+        drop(free);
+        self.checkpoint()?;
+        if failures.is_empty() { Ok(()) } else { Err(SinkError(tell(&failures))) }
+    }
+}
+
+fn open_outputs(settings: &Settings) -> Result<(Option<Output>, Option<Output>), RecorderError> {
+    let mut whole = None;
+    let detections = settings.detections.as_deref().map(|path| match settings.resume {
+        false => Output::create(path, Commit::LastByte),
+        true => Output::resume(path, Commit::LastByte, |file| {
+            let found = repair::detections(path, file)?;
+            whole = Some(found);
+            Ok(found.length)
+        }),
+    });
+    let detections = detections.transpose()?;
+    let labels = settings.labels.as_deref().map(|path| match settings.resume {
+        false => Output::create(path, Commit::FirstByte),
+        true => Output::resume(path, Commit::FirstByte, |file| Ok(repair::labels(path, file, whole)?.length)),
+    });
+    let labels = labels.transpose()?;
+    match (&detections, &labels, &settings.labels) {
+        (Some(one), Some(other), Some(path)) if one.is_same_file(other) => Err(RecorderError::SameFile(path.clone())),
+        _ => Ok((detections, labels)),
+    }
+}
+
+fn tell(failures: &[Failure]) -> String {
+    let line = |failure: &Failure| {
+        let Failure { path, error, lost_sweeps } = failure;
+        format!("{}: {error}: {lost_sweeps} sweeps lost", path.display())
+    };
+    let lines: Vec<String> = failures.iter().map(line).collect();
+    format!("{}; make room or give another path", lines.join("; "))
+}

@@ -1,0 +1,288 @@
+//! Latencies and counts against traces worked out by hand.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::{HandMade, settings, start, trace};
+use lidar::ObstacleClass;
+use messages::{ClusterSummary, Detection, Detections, Hop, Part, Trace, Verdict};
+use proptest::prelude::*;
+use recorder::{LatencySnapshot, Recorder, Settings, Snapshot};
+use stage::Sink;
+use zerocopy::FromZeros;
+
+const MS: u64 = 1_000_000;
+
+fn snapshot(recorder: &Recorder) -> Snapshot {
+    let mut snapshot = Snapshot::default();
+    recorder.snapshot_into(&mut snapshot);
+    snapshot
+}
+
+fn hop(free_ns: u64, received_ns: u64, started_ns: u64, finished_ns: u64) -> Hop {
+    Hop { free_ns, received_ns, started_ns, finished_ns, ..Hop::default() }
+}
+
+/// A whole sweep that was due at 1 s, with these hops.
+fn swept(sweep: u64, hops: &[Hop]) -> Trace {
+    let part = Part { ordinal: sweep, sweep, sector: 0, sectors: 1, sensor_time_ns: 0 };
+    let mut trace = Trace { part, due_ns: 1_000 * MS, ..Trace::default() };
+    hops.iter().for_each(|&hop| trace.push(hop));
+    trace
+}
+
+fn empty() -> Box<Detections> {
+    let mut message = Detections::new_box_zeroed().unwrap();
+    message.header.period_ns = 100 * MS;
+    message.header.complete = 1;
+    message
+}
+
+/// The one value of a distribution, which tells values apart to 0.1 % or half a microsecond.
+fn check(latency: &LatencySnapshot, expected_ns: u64) {
+    let [[value, 1]] = latency.values_ns[..] else { panic!("{latency:?} is not one value") };
+    let error = value.abs_diff(expected_ns);
+    assert!(error <= 512.max(expected_ns / 1_000), "{value} instead of {expected_ns}");
+}
+
+// verifies REC-011
+#[test]
+fn times_of_each_hop_are_those_worked_out_by_hand() {
+    let mut recorder = start(settings()).unwrap();
+    let hops = [
+        hop(0, 900 * MS, 950 * MS, 1_002 * MS),            // sent 2 ms late, 52 ms of work
+        hop(990 * MS, 1_003 * MS, 1_004 * MS, 1_010 * MS), // idle: 1 + 1 ms of transport, 6 of work
+        hop(1_015 * MS, 1_017 * MS, 1_017 * MS, 1_020 * MS), // busy for 5 ms more, then 2 of transport, 3 of work
+        hop(1_000 * MS, 1_020 * MS, 1_020 * MS, 1_027 * MS), // at once, 7 of work
+    ];
+    assert_eq!(recorder.accept(&swept(0, &hops), &empty()), Verdict::Complete);
+    let found = snapshot(&recorder);
+    check(&found.end_to_end, 27 * MS);
+    check(&found.source_late, 2 * MS);
+    assert!(found.stages[0].transport.values_ns.is_empty() && found.stages[0].queued.values_ns.is_empty());
+    check(&found.stages[0].busy, 52 * MS);
+    for (stage, [transport, queued, busy]) in found.stages[1..].iter().zip([[2, 0, 6], [2, 5, 3], [0, 0, 7]]) {
+        check(&stage.transport, transport * MS);
+        check(&stage.queued, queued * MS);
+        check(&stage.busy, busy * MS);
+    }
+    let names: Vec<_> = found.stages.iter().map(|stage| stage.stage.as_str()).collect();
+    assert_eq!(names, ["simulator", "clusterer", "extractor", "classifier"]);
+}
+
+fn with_clusters(clusters: &[(u32, u32, u32)]) -> Box<Detections> {
+    let mut message = empty();
+    for &(points, last_offset_ns, seam) in clusters {
+        let first_member = message.members.len() as u32;
+        let summary = ClusterSummary {
+            key: first_member,
+            first_member,
+            points,
+            last_offset_ns,
+            seam,
+            ..ClusterSummary::default()
+        };
+        message.detections.push(Detection { summary, ..Detection::default() }).unwrap();
+        message.members.extend_from_slice(&(first_member..first_member + points).collect::<Vec<_>>()).unwrap();
+    }
+    message.header.recorded = message.members.len() as u32;
+    message
+}
+
+// verifies REC-012
+#[test]
+fn an_obstacle_waits_from_its_own_last_return() {
+    // The sweep began at 900 ms on the host's clock; its detections went out at 1,010 ms.
+    let hops = [hop(0, 0, 0, 1_000 * MS), hop(0, 1_000 * MS, 1_000 * MS, 1_010 * MS)];
+    let clusters = with_clusters(&[(5, 30_000_000, 0), (4, 10_000_000, 0), (9, 60_000_000, 1)]);
+    let mut recorder = start(settings()).unwrap();
+    recorder.accept(&swept(0, &hops), &clusters);
+    let found = snapshot(&recorder);
+    check(&found.obstacle, 80 * MS);
+    check(&found.seam, 50 * MS);
+
+    let mut unpaced = start(Settings { paced: false, deadline_ms: 1.0, ..settings() }).unwrap();
+    unpaced.accept(&swept(0, &hops), &clusters);
+    let found = snapshot(&unpaced);
+    assert_eq!((found.obstacle.count(), found.seam.count(), found.deadline.misses), (0, 0, 0));
+    assert_eq!(found.end_to_end.count(), 1);
+}
+
+// verifies REC-012
+#[test]
+fn an_obstacle_of_a_sector_waits_from_its_own_last_return_too() {
+    // The second of four sectors was due 50 ms after the sweep's begin at 950 ms.
+    let mut part = swept(0, &[hop(0, 0, 0, 1_000 * MS), hop(0, 1_000 * MS, 1_000 * MS, 1_010 * MS)]);
+    part.part = Part { ordinal: 1, sector: 1, sectors: 4, ..part.part };
+    let mut recorder = start(settings()).unwrap();
+    recorder.accept(&part, &with_clusters(&[(5, 30_000_000, 0)]));
+    let found = snapshot(&recorder);
+    check(&found.obstacle, 30 * MS);
+    assert_eq!(found.end_to_end.count(), 0, "once a sweep, at its last part");
+}
+
+// verifies REC-013
+#[test]
+fn a_miss_is_put_to_the_longest_segment_of_the_sweep() {
+    let on_time = [hop(0, 0, 0, 1_000 * MS), hop(0, 1_001 * MS, 1_001 * MS, 1_100 * MS)];
+    let late = [hop(0, 0, 0, 1_090 * MS), hop(0, 1_091 * MS, 1_091 * MS, 1_111 * MS)];
+    let busy = [hop(0, 0, 0, 1_000 * MS), hop(0, 1_001 * MS, 1_001 * MS, 1_101 * MS)];
+    let queued = [hop(0, 0, 0, 1_000 * MS), hop(1_080 * MS, 1_080 * MS, 1_080 * MS, 1_130 * MS)];
+    let lost_on_the_way = [hop(0, 0, 0, 1_000 * MS), hop(0, 1_080 * MS, 1_110 * MS, 1_130 * MS)];
+    let mut recorder = start(settings()).unwrap();
+    for (sweep, hops) in [on_time, late, busy, queued, busy, lost_on_the_way].iter().enumerate() {
+        recorder.accept(&swept(sweep as u64, hops), &empty());
+    }
+    let found = snapshot(&recorder).deadline;
+    assert_eq!(found.misses, 5, "exactly on the deadline is on time");
+    let expected = [("source late", 1), ("clusterer busy", 2), ("clusterer queued", 1), ("clusterer transport", 1)];
+    assert_eq!(found.causes, expected.map(|(name, count)| (name.to_owned(), count)).into());
+}
+
+// verifies REC-014
+#[test]
+fn sweeps_returns_classes_and_verdicts_are_counted() {
+    let mut recorder = start(settings()).unwrap();
+    for sweep in [3, 4, 7] {
+        let (mut trace, mut detections) = HandMade::interleaved(sweep, 100, 5, 10).whole();
+        if sweep == 4 {
+            trace.hops[1].verdict = Verdict::PartialCells;
+            detections.header.complete = 0;
+        }
+        recorder.accept(&trace, &detections);
+    }
+    let (mut trace, detections) = HandMade::interleaved(8, 100, 5, 10).whole();
+    trace.hops[2].verdict = Verdict::RejectedMalformed;
+    recorder.accept(&trace, &detections);
+    let found = snapshot(&recorder);
+    assert_eq!((found.parts, found.sweeps, found.complete_sweeps, found.missing_sweeps), (4, 4, 2, 2));
+    assert_eq!((found.first_sweep, found.last_sweep), (Some(3), Some(8)));
+    assert_eq!(found.returns, 4 * 90);
+    assert_eq!(found.refused, BTreeMap::from([("too_near".to_owned(), 40)]));
+    assert_eq!(found.detections, ObstacleClass::ALL.map(|class| (class, 4)).into());
+    assert_eq!(found.stages[1].verdicts, BTreeMap::from([("partial_cells".to_owned(), 1)]));
+    assert_eq!(found.stages[2].verdicts, BTreeMap::from([("malformed".to_owned(), 1)]));
+    assert!(found.stages[0].verdicts.is_empty() && found.verdicts.is_empty());
+}
+
+#[test]
+fn a_sweep_of_sectors_is_complete_only_with_all_of_them() {
+    let mut recorder = start(settings()).unwrap();
+    for sweep in 0..3 {
+        for (trace, detections) in HandMade::interleaved(sweep, 100, 5, 10).sectors(4, |place| place as u32 % 4) {
+            if (sweep, trace.part.sector) != (1, 2) {
+                recorder.accept(&trace, &detections);
+            }
+        }
+    }
+    let found = snapshot(&recorder);
+    assert_eq!((found.parts, found.sweeps, found.complete_sweeps, found.missing_sweeps), (11, 3, 2, 0));
+    assert_eq!((found.end_to_end.count(), found.source_late.count()), (3, 11));
+}
+
+#[test]
+fn a_time_over_an_hour_counts_as_an_hour_and_is_said() {
+    let hour = 3_600_000 * MS;
+    let mut recorder = start(settings()).unwrap();
+    recorder.accept(&swept(0, &[hop(0, 0, 0, 1_000 * MS + hour)]), &empty());
+    assert_eq!(snapshot(&recorder).end_to_end.beyond, 0);
+    recorder.accept(&swept(1, &[hop(0, 0, 0, u64::MAX)]), &empty());
+    let found = snapshot(&recorder).end_to_end;
+    assert_eq!((found.beyond, found.count(), found.values_ns.len()), (1, 2, 1));
+}
+
+#[test]
+fn an_empty_distribution_has_no_percentiles() {
+    let found = LatencySnapshot::default().percentiles();
+    let json = serde_json::to_string(&found).unwrap();
+    assert_eq!(json, r#"{"count":0,"p50":null,"p99":null,"p999":null,"max":null}"#);
+}
+
+#[test]
+fn percentiles_are_the_values_of_their_rank() {
+    let sut = LatencySnapshot { values_ns: (1..=1_000).map(|ms| [ms * MS, 10]).collect(), beyond: 0 };
+    let found = sut.percentiles();
+    assert_eq!((found.count, found.p50, found.p99), (10_000, Some(500.0), Some(990.0)));
+    assert_eq!((found.p999, found.max), (Some(999.0), Some(1_000.0)));
+    let one = LatencySnapshot { values_ns: vec![[0, 1]], beyond: 0 }.percentiles();
+    assert_eq!((one.p50, one.max), (Some(0.0), Some(0.0)));
+}
+
+#[test]
+fn a_snapshot_comes_back_from_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("snapshot.json");
+    let mut recorder = start(settings()).unwrap();
+    for sweep in 0..20 {
+        let (trace, detections) = HandMade::interleaved(sweep, 100, 5, 10).whole();
+        recorder.accept(&trace, &detections);
+    }
+    let written = snapshot(&recorder);
+    written.write(&path).unwrap();
+    assert_eq!(Snapshot::read(&path).unwrap(), written);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+    assert!(Snapshot::read(&folder.path().join("none")).unwrap_err().to_string().contains("none"));
+    Snapshot { version: 9, ..written }.write(&path).unwrap();
+    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 1"));
+    std::fs::write(&path, "{").unwrap();
+    assert!(Snapshot::read(&path).unwrap_err().to_string().contains("is no snapshot"));
+}
+
+#[test]
+fn snapshots_of_different_chains_do_not_merge() {
+    let mut one = snapshot(&start(settings()).unwrap());
+    let before = one.clone();
+    let other = snapshot(&start(Settings { stages: vec!["replay".into()], ..settings() }).unwrap());
+    assert!(one.merge(&other).is_err());
+    assert_eq!(one, before);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    // verifies REC-015
+    #[test]
+    fn several_lives_merged_are_one_life(
+        sweeps in prop::collection::vec((0_u64..3, 0_u64..200 * MS, 0_usize..4, 0_usize..6), 0..12),
+        cuts in prop::collection::btree_set(0_usize..12, 0..3),
+    ) {
+        let mut number = 0;
+        let mut parts = Vec::new();
+        for (skipped, delay_ns, slow, verdict) in sweeps.clone() {
+            let (mut trace, detections) = HandMade::interleaved(number + skipped, 60, 7, 10).whole();
+            trace.hops[slow..4].iter_mut().for_each(|hop| hop.finished_ns += delay_ns);
+            trace.hops[slow].verdict = Verdict::ALL.get(verdict).copied().unwrap_or_default();
+            parts.push((trace, detections));
+            number += skipped + 1;
+        }
+        let mut whole = start(settings()).unwrap();
+        let mut life = start(settings()).unwrap();
+        let mut merged = Snapshot::default();
+        for (place, (trace, detections)) in parts.iter().enumerate() {
+            if cuts.contains(&place) {
+                merged.merge(&snapshot(&life)).unwrap();
+                life = start(settings()).unwrap();
+            }
+            whole.accept(trace, detections);
+            life.accept(trace, detections);
+        }
+        merged.merge(&snapshot(&life)).unwrap();
+        prop_assert_eq!(merged, snapshot(&whole));
+    }
+}
+
+#[test]
+fn a_snapshot_into_used_memory_is_that_into_new_memory() {
+    let mut used = Snapshot::default();
+    let mut recorder = start(settings()).unwrap();
+    for sweep in 0..3 {
+        let (_, detections) = HandMade::interleaved(sweep, 100, 5, 10).whole();
+        recorder.accept(&trace(Part { sweep, sectors: 1, ..Part::default() }), &detections);
+        recorder.snapshot_into(&mut used);
+    }
+    assert_eq!(used, snapshot(&recorder));
+    assert!(used.margin_p999_pct().is_some_and(|margin| (margin - 92.7).abs() < 0.1), "{:?}", used.margin_p999_pct());
+}
