@@ -1,0 +1,28 @@
+//! Creates the services, starts the stages, watches them, restarts them, settles their accounts, and says at the end
+//! where every part went.
+//!
+//! Reading order: [`run`] → `watch` (the loop) → `settle` (after a death) → `ledger` (the account) → `report`.
+
+mod budget;
+mod child;
+mod ending;
+mod error;
+mod house;
+mod ledger;
+mod processes;
+mod progress;
+mod report;
+mod services;
+mod settle;
+mod status;
+mod summary;
+mod watch;
+
+pub use error::SupervisorError;
+pub use house::{Running, running_instances, stage_process};
+pub use ledger::{GapReport, HopReport, LedgerReport};
+pub use processes::ProcessReport;
+pub use report::{DeadlineReport, LatencyReport, Report, StageLatency};
+pub use status::{StageStatus, Status, status};
+pub use summary::summary;
+pub use watch::{Settings, run};

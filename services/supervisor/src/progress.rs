@@ -1,0 +1,55 @@
+//! A live line on a terminal, a line every few seconds elsewhere.
+
+use std::io::{IsTerminal, Write};
+
+use crate::child::Watched;
+
+const TERMINAL_PERIOD_NS: u64 = 200_000_000;
+const LOG_PERIOD_NS: u64 = 5_000_000_000;
+
+/// Where the run is, on stderr.
+pub(crate) struct Progress {
+    on_terminal: bool,
+    next_ns: u64,
+    started_ns: u64,
+    goal: Option<u64>,
+    shown: bool,
+}
+
+impl Progress {
+    pub(crate) fn new(now_ns: u64, goal: Option<u64>) -> Self {
+        let on_terminal = std::io::stderr().is_terminal();
+        let first = if on_terminal { TERMINAL_PERIOD_NS } else { LOG_PERIOD_NS };
+        Self { on_terminal, next_ns: now_ns + first, started_ns: now_ns, goal, shown: false }
+    }
+
+    /// Shows the line when it is time for it.
+    pub(crate) fn show(&mut self, now_ns: u64, stages: &[Watched]) {
+        if now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns + if self.on_terminal { TERMINAL_PERIOD_NS } else { LOG_PERIOD_NS };
+        let (Some(source), Some(sink)) = (stages.first(), stages.last()) else { return };
+        let goal = self.goal.map_or(String::new(), |goal| format!(" of {goal}"));
+        let missing: u64 = stages.iter().map(|stage| stage.page.dropped.get() + stage.page.lost.get()).sum();
+        let restarts: u64 = stages.iter().map(|stage| stage.restarts.total).sum();
+        let line = format!(
+            "{:7.1} s  sweep {}{goal}  answered {}  missing {missing}  restarts {restarts}",
+            (now_ns - self.started_ns) as f64 / 1e9,
+            source.page.published.get(),
+            sink.page.processed.get(),
+        );
+        let mut stderr = std::io::stderr().lock();
+        // A closed stderr is no reason to stop a chain.
+        let _ = if self.on_terminal { write!(stderr, "\r{line}\x1b[K") } else { writeln!(stderr, "{line}") };
+        let _ = stderr.flush();
+        self.shown = true;
+    }
+
+    /// Clears the live line.
+    pub(crate) fn end(&self) {
+        if self.on_terminal && self.shown {
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
+        }
+    }
+}

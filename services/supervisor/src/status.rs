@@ -1,0 +1,56 @@
+use runtime::page::PageMap;
+use runtime::{Plan, ShellError, clock};
+use serde::{Deserialize, Serialize};
+use transport::Instance;
+
+/// A running chain at this moment.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Status {
+    /// The instance.
+    pub instance: String,
+    /// `nominal`: there is no other mode yet.
+    pub mode: String,
+    /// Sweeps that the source has published.
+    pub sweep: u64,
+    /// The stages in flow order, the source first.
+    pub stages: Vec<StageStatus>,
+}
+
+/// One stage at this moment.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct StageStatus {
+    /// Its name.
+    pub stage: String,
+    /// Its process.
+    pub pid: u64,
+    /// Where it is in its life.
+    pub state: String,
+    /// Restarts so far.
+    pub restarts: u64,
+    /// Since its working thread last showed that it is alive [ms].
+    pub heartbeat_age_ms: f64,
+    /// Parts received.
+    pub received: u64,
+    /// Parts published; the sink: accepted.
+    pub published: u64,
+}
+
+/// Reads the pages of a running instance.
+pub fn status(instance: &Instance) -> Result<Status, ShellError> {
+    let plan = Plan::read(instance)?;
+    let mut stages = Vec::new();
+    for stage in plan.stages() {
+        let page = PageMap::open(&Plan::page_path(instance, stage))?;
+        stages.push(StageStatus {
+            stage: stage.to_owned(),
+            pid: page.pid.get(),
+            state: page.state().name().to_owned(),
+            restarts: page.incarnation.get().saturating_sub(1),
+            heartbeat_age_ms: clock::now_ns().saturating_sub(page.heartbeat_ns.get()) as f64 / 1e6,
+            received: page.received.get(),
+            published: page.published.get(),
+        });
+    }
+    let sweep = stages.first().map_or(0, |source| source.published) / u64::from(plan.chain.sectors.max(1));
+    Ok(Status { instance: instance.name().to_owned(), mode: "nominal".to_owned(), sweep, stages })
+}

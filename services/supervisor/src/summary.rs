@@ -1,0 +1,132 @@
+//! The report for people.
+
+use std::fmt::Write;
+
+use recorder::Percentiles;
+
+use crate::Report;
+
+/// The summary of a run, a page of text.
+pub fn summary(report: &Report) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_summary(&mut text, report);
+    text
+}
+
+fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
+    writeln!(text, "encke {}  {}", report.encke, report.source)?;
+    writeln!(
+        text,
+        "{} sweeps ({} complete, {} returns) in {:.1} s at {} pace; {}",
+        report.sweeps,
+        report.complete_sweeps,
+        report.returns,
+        report.duration_s,
+        serde_word(&report.pace),
+        report.machine
+    )?;
+    if !report.refused.is_empty() {
+        let reasons: Vec<_> = report.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        writeln!(text, "returns refused: {}", reasons.join(", "))?;
+    }
+    write_ledger(text, report)?;
+    write_latency(text, report)?;
+    write_processes(text, report)?;
+    let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
+    writeln!(text, "\ndetections  {}", classes.join("  "))?;
+    if let Some(reason) = &report.stopped {
+        writeln!(text, "STOPPED: {reason}")?;
+    }
+    Ok(())
+}
+
+fn write_ledger(text: &mut String, report: &Report) -> std::fmt::Result {
+    let state = if report.ledger.closed { "closed" } else { "OPEN" };
+    writeln!(text, "\nledger {state}")?;
+    writeln!(
+        text,
+        "  {:<12}{:>10}{:>10}{:>10}{:>10}{:>9}{:>6}{:>10}{:>6}",
+        "hop to", "published", "received", "processed", "rejected", "dropped", "lost", "in flight", "open"
+    )?;
+    for hop in &report.ledger.hops {
+        writeln!(
+            text,
+            "  {:<12}{:>10}{:>10}{:>10}{:>10}{:>9}{:>6}{:>10}{:>6}",
+            hop.stage,
+            hop.published,
+            hop.received,
+            hop.processed,
+            hop.rejected.values().sum::<u64>(),
+            hop.dropped.values().sum::<u64>(),
+            hop.lost,
+            hop.in_flight,
+            hop.open
+        )?;
+    }
+    for gap in &report.ledger.gaps {
+        let sweeps = if gap.first_sweep == gap.last_sweep {
+            format!("sweep {}", gap.first_sweep)
+        } else {
+            format!("sweeps {} to {}", gap.first_sweep, gap.last_sweep)
+        };
+        writeln!(text, "  {} {}: {} ({} parts)", gap.stage, gap.kind, sweeps, gap.parts)?;
+    }
+    Ok(())
+}
+
+fn write_latency(text: &mut String, report: &Report) -> std::fmt::Result {
+    writeln!(text, "\nlatency [ms]            p50       p99     p99.9       max")?;
+    let mut row = |name: &str, latency: &Percentiles| {
+        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |ms| format!("{ms:.3}"));
+        writeln!(
+            text,
+            "  {name:<16}{:>10}{:>10}{:>10}{:>10}",
+            ms(latency.p50),
+            ms(latency.p99),
+            ms(latency.p999),
+            ms(latency.max)
+        )
+    };
+    row("end to end", &report.latency_ms.end_to_end)?;
+    row("obstacle", &report.obstacle_latency_ms)?;
+    row("  on the seam", &report.seam_latency_ms)?;
+    for hop in &report.ledger.hops {
+        if let Some(stage) = report.latency_ms.stages.get(&hop.stage) {
+            row(&format!("{} wait", hop.stage), &stage.transport)?;
+            row(&format!("{} queue", hop.stage), &stage.queued)?;
+            row(&format!("{} busy", hop.stage), &stage.busy)?;
+        }
+    }
+    let deadline = &report.deadline;
+    let margin = deadline.margin_p999_pct.map_or(String::new(), |pct| format!(", margin at p99.9 {pct:.0} %"));
+    writeln!(text, "deadline {} ms: {} misses{margin}", deadline.deadline_ms, deadline.misses)?;
+    for (cause, misses) in &deadline.causes {
+        writeln!(text, "  {misses} by {cause}")?;
+    }
+    Ok(())
+}
+
+fn write_processes(text: &mut String, report: &Report) -> std::fmt::Result {
+    writeln!(text, "\nprocess          pid  restarts  cpu [%]  rss peak [MiB]  allocations in process")?;
+    for process in &report.processes {
+        let allocations = process.heap_allocations_per_sweep.map_or("-".to_owned(), |count| format!("{count}"));
+        writeln!(
+            text,
+            "  {:<12}{:>7}{:>8}{:>10.1}{:>16.1}{allocations:>24}",
+            process.stage,
+            process.pid,
+            process.restarts,
+            process.cpu_pct,
+            process.rss_peak_kib as f64 / 1024.0
+        )?;
+    }
+    Ok(())
+}
+
+fn serde_word(pace: &runtime::Pace) -> &'static str {
+    match pace {
+        runtime::Pace::Realtime => "real-time",
+        runtime::Pace::Fast => "fast",
+    }
+}

@@ -1,0 +1,329 @@
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, bounded, select, tick};
+use recorder::Snapshot;
+use runtime::page::{Page, State};
+use runtime::{Pace, Plan, clock};
+use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use transport::{Instance, Node};
+
+use crate::child::{Ended, Watched};
+use crate::house::House;
+use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS, Usage};
+use crate::progress::Progress;
+use crate::report::{Facts, Report};
+use crate::services::Services;
+use crate::settle::settle;
+use crate::{SupervisorError, ledger};
+
+/// Between two looks at the pages.
+const LOOK: Duration = Duration::from_millis(5);
+/// Between two looks at `/proc` [ns].
+const SAMPLE_NS: u64 = 1_000_000_000;
+/// How long the stages may take to come up [ns].
+const START_PATIENCE_NS: u64 = 10_000_000_000;
+/// How long nothing may move after the source has ended [ns].
+const STALL_NS: u64 = 5_000_000_000;
+/// Exit code of a stage that cannot start: restarting it would not help.
+const CANNOT_START: i32 = 2;
+
+/// What to run.
+pub struct Settings<'a> {
+    /// The instance.
+    pub instance: Instance,
+    /// The plan.
+    pub plan: Plan,
+    /// Template of the instance's iceoryx2 configuration.
+    pub iceoryx2_config: &'a str,
+    /// Start the stages; else they are started by somebody else.
+    pub spawn: bool,
+}
+
+/// Runs a chain from its first process to its last, and reports.
+pub fn run(settings: Settings<'_>) -> Result<Report, SupervisorError> {
+    let signals = signals()?;
+    let house = House::take(settings.instance, settings.iceoryx2_config)?;
+    let outcome = Watch::begin(&house, &settings.plan, settings.spawn, signals).and_then(Watch::watch_through);
+    if let Err(error) = house.leave() {
+        tracing::error!(%error, "the instance could not be removed");
+    }
+    outcome
+}
+
+/// SIGINT, SIGTERM and SIGHUP (the terminal is gone) to stop, SIGCHLD to look at once.
+fn signals() -> Result<Receiver<i32>, SupervisorError> {
+    let system = |cause| SupervisorError::System { what: "set up signals".to_owned(), cause };
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(system)?;
+    let (sender, receiver) = bounded(64);
+    std::thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || {
+            for signal in signals.forever() {
+                // Full of SIGCHLD: the looks by time will do. A stop must get through.
+                if sender.try_send(signal).is_err() && signal != SIGCHLD && sender.send(signal).is_err() {
+                    return;
+                }
+            }
+        })
+        .map_err(system)?;
+    Ok(receiver)
+}
+
+/// A chain being watched.
+pub(crate) struct Watch<'a> {
+    instance: &'a Instance,
+    plan: &'a Plan,
+    spawn: bool,
+    pub(crate) stages: Vec<Watched>,
+    // Services before the node: they are its guests.
+    services: Services,
+    pub(crate) node: Node,
+    signals: Receiver<i32>,
+    looks: Receiver<std::time::Instant>,
+    started_ns: u64,
+    next_sample_ns: u64,
+    usage: Usage,
+    progress: Progress,
+    /// Every stage was up once.
+    begun: bool,
+    stop_asked: bool,
+    failed: Option<String>,
+    /// What the pages counted when they last changed, and when that was.
+    moved: u64,
+    moved_ns: u64,
+}
+
+impl<'a> Watch<'a> {
+    /// Creates services and pages, then starts the stages: readers before writers, the source last.
+    fn begin(house: &'a House, plan: &'a Plan, spawn: bool, signals: Receiver<i32>) -> Result<Self, SupervisorError> {
+        let instance = house.instance();
+        let node = Node::join(instance, "supervisor", plan.chain.queue_parts)?;
+        let services = Services::create(&node, plan)?;
+        let count = plan.stages().count();
+        let stages =
+            (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
+        plan.write(instance)?;
+        let now_ns = clock::now_ns();
+        let mut watch = Self {
+            instance,
+            plan,
+            spawn,
+            stages,
+            services,
+            node,
+            signals,
+            looks: tick(LOOK),
+            started_ns: now_ns,
+            next_sample_ns: now_ns + SAMPLE_NS,
+            usage: Usage::default(),
+            progress: Progress::new(now_ns, plan.sweeps),
+            begun: false,
+            stop_asked: false,
+            failed: None,
+            moved: 0,
+            moved_ns: now_ns,
+        };
+        let started = watch.start_all();
+        if started.is_err() {
+            watch.kill_all();
+        }
+        started.map(|()| watch)
+    }
+
+    fn start_all(&mut self) -> Result<(), SupervisorError> {
+        for position in (1..self.stages.len()).rev() {
+            self.stages[position].start()?;
+        }
+        self.await_up(1)?;
+        if !self.stop_asked {
+            self.stages[0].page.may_start.set(1);
+            self.stages[0].start()?;
+            self.await_up(0)?;
+        }
+        self.begun = true;
+        Ok(())
+    }
+
+    /// Waits until the stages from `first` on are connected, restarting those that die on the way.
+    fn await_up(&mut self, first: usize) -> Result<(), SupervisorError> {
+        // Somebody who starts stages by hand takes the time he takes.
+        let patience_ns = if self.spawn { START_PATIENCE_NS } else { u64::MAX / 2 };
+        let end_ns = clock::now_ns() + patience_ns;
+        loop {
+            self.look_once()?;
+            if self.stop_asked || self.stages[first..].iter().all(Watched::is_up) {
+                return Ok(());
+            }
+            if clock::now_ns() > end_ns {
+                let missing = self.stages[first..].iter().filter(|stage| !stage.is_up());
+                return Err(SupervisorError::NotUp(missing.map(|stage| stage.name.clone()).collect()));
+            }
+        }
+    }
+
+    /// Watches until the source has ended and everything has come through, or until asked to stop; then ends the chain.
+    fn watch_through(mut self) -> Result<Report, SupervisorError> {
+        while !self.stop_asked && self.failed.is_none() && !self.is_done() && !self.is_stalled() {
+            if let Err(error) = self.look_once() {
+                self.kill_all();
+                return Err(error);
+            }
+        }
+        let stopped = self.stop_in_order();
+        self.progress.end();
+        if stopped.is_err() {
+            self.kill_all();
+        }
+        stopped?;
+        Ok(self.report())
+    }
+
+    fn is_done(&self) -> bool {
+        self.stages[0].page.state() == State::Ended
+            && self.stages[0].is_up()
+            && (1..self.stages.len()).all(|position| self.is_drained(position))
+    }
+
+    /// Whether nothing has moved for a while, nor will: nothing is held and the source waits in vain (parts were
+    /// swallowed), or it has ended and at real time nobody waits for a stage that hangs or a file that nobody reads.
+    fn is_stalled(&mut self) -> bool {
+        let moved = self.stages.iter().map(|stage| stage.page.received.get() + stage.page.processed.get()).sum();
+        if moved != self.moved {
+            (self.moved, self.moved_ns) = (moved, clock::now_ns());
+        }
+        if !self.begun || clock::now_ns() - self.moved_ns < STALL_NS {
+            return false;
+        }
+        let drained = (1..self.stages.len()).all(|position| self.is_drained(position));
+        match self.plan.pace {
+            Pace::Fast => drained && self.stages[0].page.in_hand.get() == 0,
+            Pace::Realtime => self.stages[0].page.state() == State::Ended,
+        }
+    }
+
+    /// Whether the stage has taken and finished everything that the one before published.
+    pub(crate) fn is_drained(&self, position: usize) -> bool {
+        let (before, stage) = (&self.stages[position - 1].page, &self.stages[position].page);
+        stage.next_sequence.get() >= before.published.get() && stage.held(self.is_sink(position)) == 0
+    }
+
+    fn is_sink(&self, position: usize) -> bool {
+        position + 1 == self.stages.len()
+    }
+
+    /// Sleeps until something happens, then looks at everything once.
+    pub(crate) fn look_once(&mut self) -> Result<(), SupervisorError> {
+        select! {
+            recv(self.signals) -> signal => {
+                if matches!(signal, Ok(SIGINT | SIGTERM | SIGHUP)) {
+                    self.stop_asked = true;
+                }
+            }
+            recv(self.looks) -> _ => {}
+        }
+        // All are looked at first, and the last recovers first: whoever asks a reader finds it settled.
+        let ended: Vec<_> = self.stages.iter_mut().map(Watched::look).collect();
+        for (position, ended) in ended.into_iter().enumerate().rev() {
+            if let Some(ended) = ended {
+                self.recover(position, ended)?;
+            }
+            self.name_losses(position);
+        }
+        let now_ns = clock::now_ns();
+        if now_ns >= self.next_sample_ns {
+            self.next_sample_ns = now_ns + SAMPLE_NS;
+            self.sample();
+        }
+        self.progress.show(now_ns, &self.stages);
+        Ok(())
+    }
+
+    /// A stage's process has ended: settle its account and start its successor.
+    fn recover(&mut self, position: usize, ended: Ended) -> Result<(), SupervisorError> {
+        settle(&self.node, &self.services, &mut self.stages, position, ended);
+        let stage = &mut self.stages[position];
+        if stage.told {
+            return Ok(());
+        }
+        if ended == Ended::Code(CANNOT_START) {
+            if !self.begun {
+                return Err(SupervisorError::Refused(stage.name.clone()));
+            }
+            self.failed.get_or_insert(format!("stage {:?} could not start again: the chain was stopped", stage.name));
+            stage.told = true;
+            return Ok(());
+        }
+        if !stage.restarts.allow(clock::now_ns()) {
+            let budget = self.plan.chain.restart_budget;
+            self.failed.get_or_insert(format!(
+                "stage {:?} died more than {} times within {} s: the chain was stopped",
+                stage.name, budget.restarts, budget.window_s
+            ));
+            stage.told = true;
+            return Ok(());
+        }
+        stage.recovering = true;
+        stage.start()
+    }
+
+    /// A successor is connected: what was published before that and did not reach it is lost. It says so itself, once
+    /// it has looked; nobody waits for what will never come.
+    fn name_losses(&mut self, position: usize) {
+        if !self.stages[position].recovering || !self.stages[position].is_up() {
+            return;
+        }
+        self.stages[position].recovering = false;
+        if position > 0 {
+            let published = self.stages[position - 1].page.published.get();
+            self.stages[position].page.lose_below.set(published);
+            self.services.wake_readers_of(position - 1);
+        }
+    }
+
+    pub(crate) fn sample(&mut self) {
+        let settled = clock::now_ns() - self.started_ns >= SETTLE_NS
+            && self.stages[0].page.published.get() >= SETTLE_SWEEPS * u64::from(self.plan.chain.sectors);
+        for stage in &mut self.stages {
+            if let Some(pid) = stage.pid() {
+                stage.usage.update(pid.as_raw_nonzero().get() as u32, settled);
+            }
+        }
+        self.usage.update(std::process::id(), settled);
+    }
+
+    fn report(mut self) -> Report {
+        let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
+        self.usage.update(std::process::id(), true);
+        let pages: Vec<(&str, &Page)> = self.stages.iter().map(|stage| (stage.name.as_str(), &*stage.page)).collect();
+        let mut processes: Vec<_> =
+            self.stages.iter().map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
+        processes.push(ProcessReport::of_supervisor(&self.usage, duration_s));
+        Report::of(Facts {
+            plan: self.plan,
+            snapshot: self.snapshot(),
+            ledger: ledger::account(&pages, self.plan.chain.sectors),
+            published: self.stages[0].page.published.get(),
+            duration_s,
+            processes,
+            stopped: self.failed.clone(),
+        })
+    }
+
+    /// The sink's statistics of all its lives.
+    fn snapshot(&self) -> Snapshot {
+        let mut all = Snapshot::default();
+        let lives = self.stages.last().map_or(0, |sink| sink.page.incarnation.get());
+        for life in 1..=lives {
+            let path = Plan::snapshot_path(self.instance, life as u32);
+            // A life that ended before its first checkpoint left none.
+            if !path.exists() {
+                continue;
+            }
+            if let Err(error) = Snapshot::read(&path).and_then(|snapshot| all.merge(&snapshot)) {
+                tracing::error!(%error, "statistics of one life of the sink are missing");
+            }
+        }
+        all
+    }
+}
