@@ -1,0 +1,309 @@
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use runtime::Pace;
+
+/// Onboard lidar perception for spacecraft in clutter: a chain of processes that turns lidar sweeps into classified
+/// obstacles at sensor rate, with every deadline watched and every sweep accounted for.
+///
+/// `encke` alone runs the chain on the default scene for 100 sweeps and prints a summary.
+#[derive(Parser)]
+#[command(version, after_help = "Exit codes: 0 done, 1 the run itself failed, 2 could not start.")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+impl Cli {
+    /// The command; without one, `run`.
+    pub(crate) fn chosen(self) -> Command {
+        self.command.unwrap_or_else(|| Command::Run(Box::default()))
+    }
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Run the chain on a scene or a recording.
+    #[command(after_help = RUN_EXAMPLES)]
+    Run(Box<RunArgs>),
+    /// Be one stage of a running instance (the supervisor starts these).
+    #[command(after_help = "Example:\n  encke stage clusterer --instance flight-1")]
+    Stage(StageArgs),
+    /// Write simulated sweeps to a file, without the chain, and the truth beside it.
+    #[command(after_help = SIMULATE_EXAMPLES)]
+    Simulate(SimulateArgs),
+    /// Train the paper's classifiers on simulated obstacles.
+    #[command(after_help = "Example:\n  encke train --plan config/training/paper.toml --out config/models")]
+    Train(TrainArgs),
+    /// Repeat the paper's experiments: tables and figures as a page, and as JSON.
+    #[command(after_help = "Example:\n  encke evaluate --paper --out report/")]
+    Evaluate(EvaluateArgs),
+    /// Put one fault into a running chain, to see it accounted for.
+    #[command(after_help = INJECT_EXAMPLES)]
+    Inject(InjectArgs),
+    /// Look at a running chain, or stop it.
+    #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
+    Ctl(CtlArgs),
+}
+
+const RUN_EXAMPLES: &str = "Examples:
+  encke run                                        the default scene, 100 sweeps
+  encke run --from capture.pcap --detections d.jsonl --labels l.csv
+  encke run --from config/scenes/ring-crossing.toml --duration 60s --report report.json
+  encke run --from sweeps/ --pace fast             as fast as it goes, nothing dropped
+
+Ctrl-C and SIGTERM stop the chain in order, drain it, and print the summary.";
+
+const SIMULATE_EXAMPLES: &str = "Examples:
+  encke simulate --scene config/scenes/default.toml --sweeps 50 --out scene.pcap
+  encke simulate --scene config/scenes/reference.toml --sweeps 5 --out sweeps/";
+
+const INJECT_EXAMPLES: &str = "Faults:
+  kill     SIGKILL to the stage's process
+  stop     SIGSTOP, and SIGCONT after --for (500 ms)
+  slow     make each of its cycles longer by --by (20 ms); --by 0ms ends it
+  swallow  let it lose one part and say nothing: the ledger must come out OPEN
+
+Example:
+  encke inject stop clusterer --for 500ms";
+
+/// Options of `encke run`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RunArgs {
+    /// The topology: [default: ./config/chain.toml, else the one built in]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) chain: Option<PathBuf>,
+    /// A scene (.toml) or a recording, a file or a folder. [default: chain.toml's]
+    #[arg(long, value_name = "SOURCE")]
+    pub(crate) from: Option<PathBuf>,
+    /// Format of the recording, where it is not to be found by content.
+    #[arg(long)]
+    pub(crate) format: Option<String>,
+    /// Sensor model: the stem of a file in config/sensors.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sensor: Option<String>,
+    /// Refuse returns nearer than this. [default: the sensor file's]
+    #[arg(long, value_name = "M")]
+    pub(crate) min_range: Option<f64>,
+    /// Refuse returns farther than this. [default: the sensor file's]
+    #[arg(long, value_name = "M")]
+    pub(crate) max_range: Option<f64>,
+    /// At sensor rate (a slow stage drops and counts), or as fast as the chain goes (nothing is dropped).
+    #[arg(long, value_enum, default_value_t = PaceArg::Realtime)]
+    pub(crate) pace: PaceArg,
+    /// Stop after N sweeps. [default: 100 for a scene, all of a recording]
+    #[arg(long, value_name = "N", conflicts_with = "duration")]
+    pub(crate) sweeps: Option<u64>,
+    /// Stop after this much sensor time: 30s, 5m, 2h, forever.
+    #[arg(long, value_parser = parse_span)]
+    pub(crate) duration: Option<Span>,
+    /// Azimuth sectors that a sweep travels as. [default: chain.toml's]
+    #[arg(long, value_name = "S")]
+    pub(crate) sectors: Option<u32>,
+    /// Start again at the recording's end.
+    #[arg(long = "loop")]
+    pub(crate) repeat: bool,
+    /// Seed of the scene. [default: the scene's own]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Write detections, one JSON line a sweep; - is standard output.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) detections: Option<PathBuf>,
+    /// Write the cluster of every return: sweep,return,cluster; - is standard output.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) labels: Option<PathBuf>,
+    /// Write the summary as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) report: Option<PathBuf>,
+    /// Name of this chain among those on the machine. [default: unique to the run]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+    /// Supervise stages that somebody else starts.
+    #[arg(long)]
+    pub(crate) no_spawn: bool,
+    /// Exit 1 on any deadline miss, drop or loss.
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Default for RunArgs {
+    fn default() -> Self {
+        #[derive(Parser)]
+        struct Bare {
+            #[command(flatten)]
+            args: RunArgs,
+        }
+        Bare::parse_from(["encke"]).args
+    }
+}
+
+/// `--pace`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum PaceArg {
+    Realtime,
+    Fast,
+}
+
+impl From<PaceArg> for Pace {
+    fn from(pace: PaceArg) -> Self {
+        match pace {
+            PaceArg::Realtime => Self::Realtime,
+            PaceArg::Fast => Self::Fast,
+        }
+    }
+}
+
+/// A stretch of time on the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Span {
+    Forever,
+    For(Duration),
+}
+
+fn parse_span(text: &str) -> Result<Span, String> {
+    if text == "forever" {
+        return Ok(Span::Forever);
+    }
+    let duration = parse_duration(text)?;
+    if duration.is_zero() { Err("must be more than 0s".to_owned()) } else { Ok(Span::For(duration)) }
+}
+
+fn parse_duration(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text).map_err(|cause| format!("{cause}; write 500ms, 30s, 5m or 2h"))
+}
+
+/// Options of `encke stage`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct StageArgs {
+    /// The stage: source, clusterer, extractor, classifier, recorder.
+    pub(crate) name: String,
+    /// The instance that it belongs to.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: String,
+}
+
+/// Options of `encke simulate`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct SimulateArgs {
+    /// The scene.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) scene: PathBuf,
+    /// How many sweeps.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(crate) sweeps: u64,
+    /// Where to: a `.pcap` of HDL-32E packets, or a folder of CSV files.
+    #[arg(long, value_name = "X")]
+    pub(crate) out: PathBuf,
+    /// Seed of the scene. [default: the scene's own]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+}
+
+/// Options of `encke train`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TrainArgs {
+    /// What to train on.
+    #[arg(long, value_name = "FILE.toml", default_value = "config/training/paper.toml")]
+    pub(crate) plan: PathBuf,
+    /// Folder for the models.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) out: PathBuf,
+}
+
+/// Options of `encke evaluate`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct EvaluateArgs {
+    /// The paper's experiments.
+    #[arg(long, required = true)]
+    pub(crate) paper: bool,
+    /// What to train and test on.
+    #[arg(long, value_name = "FILE.toml", default_value = "config/training/paper.toml")]
+    pub(crate) plan: PathBuf,
+    /// Folder for paper.json and paper.html.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Print the JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A fault that can be put into a running chain.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Fault {
+    Kill,
+    Stop,
+    Slow,
+    Swallow,
+}
+
+/// Options of `encke inject`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct InjectArgs {
+    /// The fault.
+    #[arg(value_enum)]
+    pub(crate) fault: Fault,
+    /// The stage.
+    pub(crate) stage: String,
+    /// stop: for how long.
+    #[arg(long = "for", value_name = "TIME", default_value = "500ms", value_parser = parse_duration)]
+    pub(crate) length: Duration,
+    /// slow: by how much each cycle.
+    #[arg(long, value_name = "TIME", default_value = "20ms", value_parser = parse_duration)]
+    pub(crate) by: Duration,
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+}
+
+/// What to ask of a running chain.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Request {
+    /// Its stages and their counts.
+    Status,
+    /// Stop in order, drain, report.
+    Stop,
+}
+
+/// Options of `encke ctl`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CtlArgs {
+    /// What to do.
+    #[arg(value_enum)]
+    pub(crate) request: Request,
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn encke_alone_runs_the_chain() {
+        let Command::Run(args) = Cli::parse_from(["encke"]).chosen() else { panic!("not run") };
+        assert!(args.from.is_none() && args.sweeps.is_none() && !args.strict);
+    }
+
+    #[test]
+    fn spans_are_read_as_people_write_them() {
+        assert_eq!(parse_span("30s"), Ok(Span::For(Duration::from_secs(30))));
+        assert_eq!(parse_span("forever"), Ok(Span::Forever));
+        assert!(parse_span("0s").is_err());
+        assert!(parse_span("30").is_err());
+    }
+}

@@ -1,0 +1,143 @@
+//! Which name is which stage.
+
+use classifier::{Card, Classifier, FeatureDefinition, ModelFiles};
+use clusterer::Clusterer;
+use extractor::Extractor;
+use recorder::{Recorder, Settings};
+use runtime::{Pace, Plan, SOURCE, Shell, ShellError, run_sink, run_source, run_stage};
+use serde::de::DeserializeOwned;
+use stage::{InitError, Settled, Stage};
+use transport::Instance;
+
+use crate::assets::Assets;
+use crate::cli::StageArgs;
+use crate::sources::{self, Opened};
+use crate::{Failure, heap_allocations};
+
+/// Name of the sink.
+const RECORDER: &str = "recorder";
+
+/// Is one stage of a running instance, until told to leave.
+pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
+    runtime::logging::install("warn");
+    let instance = Instance::named(&args.instance).map_err(Failure::start)?;
+    let plan = Shell::find_plan(&instance).map_err(Failure::start)?;
+    let assets = Assets::in_dirs(plan.config_dirs.clone());
+    let enter = |plan: Plan| Shell::enter(instance, plan, &args.name, heap_allocations);
+    let outcome = match args.name.as_str() {
+        SOURCE => match sources::open(&plan.source, &assets)? {
+            Opened::Scene(simulator) => enter(plan).and_then(|shell| run_source(*simulator, &shell)),
+            Opened::Recording(recording) => enter(plan).and_then(|shell| run_source(*recording, &shell)),
+        },
+        Clusterer::NAME => {
+            let stage = clusterer(&plan)?;
+            enter(plan).and_then(|shell| run_stage(stage, &shell))
+        }
+        Extractor::NAME => {
+            let stage = extractor(&plan)?;
+            enter(plan).and_then(|shell| run_stage(stage, &shell))
+        }
+        Classifier::NAME => {
+            let stage = classifier(&plan, &assets)?;
+            enter(plan).and_then(|shell| run_stage(stage, &shell))
+        }
+        RECORDER => enter(plan).and_then(|shell| run_sink(shell, recorder)),
+        name => return Err(unknown(name)),
+    };
+    outcome.map_err(|error| match error {
+        ShellError::Init { .. } => Failure::start(error),
+        error => Failure::run(format!("{}: {error}", args.name)),
+    })
+}
+
+/// Builds everything that the plan names once, so that what a stage would refuse is known before any process starts.
+pub(crate) fn check(plan: &Plan, assets: &Assets) -> Result<(), Failure> {
+    drop(sources::open(&plan.source, assets)?);
+    for stage in &plan.chain.stages {
+        match stage.name.as_str() {
+            Clusterer::NAME => drop(clusterer(plan)?),
+            Extractor::NAME => drop(extractor(plan)?),
+            Classifier::NAME => drop(classifier(plan, assets)?),
+            RECORDER => {}
+            name => return Err(unknown(name)),
+        }
+    }
+    Ok(())
+}
+
+fn unknown(name: &str) -> Failure {
+    let known = [SOURCE, Clusterer::NAME, Extractor::NAME, Classifier::NAME, RECORDER].join(", ");
+    Failure::start(format!("no stage {name:?}; there are {known}"))
+}
+
+fn clusterer(plan: &Plan) -> Result<Clusterer, Failure> {
+    init(plan, |_| Ok(()))
+}
+
+fn extractor(plan: &Plan) -> Result<Extractor, Failure> {
+    init(plan, |_| Ok(()))
+}
+
+fn classifier(plan: &Plan, assets: &Assets) -> Result<Classifier, Failure> {
+    init::<Classifier>(plan, |params| {
+        let folder = format!("models/{}", params.model);
+        let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
+        let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
+        fits_extractor(plan, &parsed.features, &params.model)?;
+        let model = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
+        params.files = Some(ModelFiles { card, model });
+        Ok(())
+    })
+}
+
+/// A model judges only what the extractor that it was trained with describes.
+fn fits_extractor(plan: &Plan, features: &FeatureDefinition, model: &str) -> Result<(), Failure> {
+    let text = plan.parameters.get(Extractor::NAME).map_or("", String::as_str);
+    // The extractor itself says what is wrong with its file.
+    let Ok(found) = toml::from_str::<extractor::Params>(text) else { return Ok(()) };
+    let (neighbours, spacing_deg) = (features.neighbours, features.spacing_deg);
+    if (found.neighbours, found.spacing_deg) == (neighbours, spacing_deg) {
+        return Ok(());
+    }
+    Err(Failure::start(format!(
+        "model {model:?} was trained with neighbours = {neighbours}, spacing_deg = {spacing_deg}; the extractor has {}, {}: \
+         train anew, or set them back",
+        found.neighbours, found.spacing_deg
+    )))
+}
+
+/// Reads a stage's parameters, lets `complete` add what lies in other files, and builds the stage.
+fn init<S: Stage>(plan: &Plan, complete: impl FnOnce(&mut S::Params) -> Result<(), Failure>) -> Result<S, Failure>
+where
+    S::Params: DeserializeOwned,
+{
+    let wired = plan.chain.stages.iter().find(|stage| stage.name == S::NAME);
+    let file = wired.and_then(|stage| stage.parameters.clone()).unwrap_or_default();
+    let named = |cause: &dyn std::fmt::Display| Failure::start(format!("{file}: {}", cause.to_string().trim_end()));
+    let text = plan.parameters.get(S::NAME).ok_or_else(|| {
+        Failure::start(format!("chain.toml: stage {:?} names no file of parameters, must name one", S::NAME))
+    })?;
+    let mut params: S::Params = toml::from_str(text).map_err(|cause| named(&cause))?;
+    complete(&mut params)?;
+    S::init(params).map_err(|cause| named(&cause))
+}
+
+fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
+    let plan = shell.plan();
+    let settings = Settings {
+        detections: plan.outputs.detections.clone(),
+        labels: plan.outputs.labels.clone(),
+        statistics: Some(Plan::snapshot_path(shell.instance(), shell.incarnation())),
+        resume: shell.incarnation() > 1,
+        queue_parts: WRITER_QUEUE_PARTS.max(plan.chain.queue_parts),
+        lossless: plan.pace == Pace::Fast,
+        paced: plan.pace == Pace::Realtime,
+        deadline_ms: plan.chain.deadline_ms,
+        stages: plan.stages().filter(|stage| *stage != RECORDER).map(str::to_owned).collect(),
+    };
+    Recorder::start(settings, settled)
+        .map_err(|cause| ShellError::Init { stage: RECORDER, cause: InitError::new(cause) })
+}
+
+/// Parts that may wait for a slow disk before the recorder rejects: 1.6 s of whole sweeps at 10 Hz.
+const WRITER_QUEUE_PARTS: usize = 16;

@@ -1,0 +1,128 @@
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use chain::{Chain, ChainFile};
+use runtime::{Outputs, Plan, SourcePlan};
+use supervisor::{Report, Settings};
+use transport::Instance;
+
+use crate::assets::Assets;
+use crate::cli::{RunArgs, Span};
+use crate::{Failure, dispatch, outputs, sources};
+
+/// Runs the chain and prints its summary.
+pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
+    runtime::logging::install("warn");
+    let assets = Assets::beside(args.chain.as_deref());
+    let plan = plan(args, &assets)?;
+    // What a stage would refuse is refused here, before anything starts.
+    dispatch::check(&plan, &assets)?;
+    let name = args.instance.clone().unwrap_or_else(|| format!("run-{}", std::process::id()));
+    let instance = Instance::named(&name).map_err(Failure::start)?;
+    let iceoryx2_config = assets.text("iceoryx2.toml").map_err(Failure::start)?;
+    let files = [
+        ("--detections", plan.outputs.detections.as_deref()),
+        ("--labels", plan.outputs.labels.as_deref()),
+        ("--report", args.report.as_deref()),
+    ];
+    outputs::check(&files, &plan.source.from)?;
+
+    let settings = Settings { instance, plan, iceoryx2_config: &iceoryx2_config, spawn: !args.no_spawn };
+    let report = supervisor::run(settings).map_err(Failure::start)?;
+
+    let json = serde_json::to_string_pretty(&report).map_err(Failure::run)? + "\n";
+    if let Some(path) = &args.report {
+        outputs::write_whole(path, json.as_bytes())?;
+    }
+    let text = if args.json { json } else { supervisor::summary(&report) };
+    crate::print(&text)?;
+    verdict(&report, args.strict)
+}
+
+fn verdict(report: &Report, strict: bool) -> Result<(), Failure> {
+    report.failure(strict).map_or(Ok(()), |cause| Err(Failure::Failed(cause)))
+}
+
+/// Everything that the processes of the run must agree on.
+fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
+    let chain = chain(args, assets)?;
+    let mut parameters = BTreeMap::new();
+    for stage in &chain.stages {
+        if let Some(path) = &stage.parameters {
+            parameters.insert(stage.name.clone(), assets.text(path).map_err(Failure::start)?);
+        }
+    }
+    let from = match &args.from {
+        Some(from) => sources::locate(from, assets)?,
+        None => sources::locate_default(&chain.default_source, assets)?,
+    };
+    let is_scene = sources::is_scene(&from);
+    refuse_idle_options(args, is_scene)?;
+    let (sweeps, duration_ns) = match (args.sweeps, args.duration) {
+        (Some(sweeps), _) => (Some(sweeps), None),
+        (None, Some(Span::For(duration))) => (None, Some(duration.as_nanos() as u64)),
+        (None, Some(Span::Forever)) => (None, None),
+        (None, None) => (is_scene.then_some(chain.default_sweeps), None),
+    };
+    let absolute = |path: &Option<PathBuf>| match path.as_deref() {
+        Some(path) if path == Path::new("-") => Ok(Some(path.to_owned())), // standard output
+        Some(path) => std::path::absolute(path).map(Some).map_err(Failure::start),
+        None => Ok(None),
+    };
+    Ok(Plan {
+        supervisor_pid: std::process::id(),
+        parameters,
+        source: SourcePlan {
+            from,
+            format: args.format.clone(),
+            sensor: args.sensor.clone(),
+            min_range_m: args.min_range,
+            max_range_m: args.max_range,
+            repeat: args.repeat,
+            seed: args.seed,
+        },
+        pace: args.pace.into(),
+        sweeps,
+        duration_ns,
+        outputs: Outputs { detections: absolute(&args.detections)?, labels: absolute(&args.labels)? },
+        config_dirs: assets.dirs().to_vec(),
+        chain,
+    })
+}
+
+/// An option that would change nothing is a mistake of the one who wrote it.
+fn refuse_idle_options(args: &RunArgs, is_scene: bool) -> Result<(), Failure> {
+    let for_recordings = [
+        ("--format", args.format.is_some()),
+        ("--sensor", args.sensor.is_some()),
+        ("--min-range", args.min_range.is_some()),
+        ("--max-range", args.max_range.is_some()),
+        ("--loop", args.repeat),
+    ];
+    let idle = for_recordings.into_iter().find(|(_, given)| *given && is_scene);
+    if let Some((option, _)) = idle {
+        return Err(Failure::start(format!("{option} is for recordings, and the source is a scene: leave it out")));
+    }
+    if args.seed.is_some() && !is_scene {
+        return Err(Failure::start("--seed is for scenes, and the source is a recording: leave it out"));
+    }
+    Ok(())
+}
+
+fn chain(args: &RunArgs, assets: &Assets) -> Result<Chain, Failure> {
+    let (name, text) = match &args.chain {
+        Some(path) => {
+            let text = fs::read_to_string(path);
+            (path.display().to_string(), text.map_err(|cause| Failure::start(format!("{}: {cause}", path.display())))?)
+        }
+        None => ("chain.toml".to_owned(), assets.text("chain.toml").map_err(Failure::start)?),
+    };
+    let named = |cause: chain::ChainError| Failure::start(format!("{name}: {cause}"));
+    let mut file = ChainFile::parse(&text).map_err(named)?;
+    if let Some(sectors) = args.sectors {
+        file.sectors = sectors;
+    }
+    let chain = file.checked().map_err(named)?;
+    Ok(chain)
+}
