@@ -1,0 +1,148 @@
+//! Wrong input gets one clear line and exit code 2; nothing is left behind.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use support::{encke, text};
+
+/// Runs `encke` and expects it to refuse: exit 2, one line that holds all of `words`.
+fn refused(args: &[&str], words: &[&str]) {
+    let output = encke().args(args).output().unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+    for word in words {
+        assert!(said.contains(word), "{args:?} says {said:?}, must name {word:?}");
+    }
+    assert!(!said.contains("panicked"), "{said}");
+}
+
+/// The same with one line only.
+fn refused_in_one_line(args: &[&str], words: &[&str]) {
+    refused(args, words);
+    let said = text(&encke().args(args).output().unwrap().stderr);
+    assert_eq!(said.trim_end().lines().count(), 1, "{said:?}");
+}
+
+#[test]
+fn a_source_that_is_not_there_or_not_a_recording_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    fs::write(path("empty.pcap"), b"").unwrap();
+    fs::write(path("text.bin"), b"this is no recording of anything at all, only words in a row").unwrap();
+    fs::create_dir(path("empty")).unwrap();
+    refused_in_one_line(&["run", "--from", "no/such.pcap"], &["no/such.pcap"]);
+    refused_in_one_line(&["run", "--from", &path("empty.pcap")], &["empty.pcap"]);
+    refused_in_one_line(&["run", "--from", &path("text.bin")], &["text.bin"]);
+    refused_in_one_line(&["run", "--from", &path("empty")], &["empty"]);
+    refused_in_one_line(&["run", "--from", &path("text.bin"), "--format", "las"], &["las", "pcap"]);
+}
+
+#[test]
+fn a_broken_configuration_names_file_key_and_remedy() {
+    let dir = tempfile::tempdir().unwrap();
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("config"), dir.path());
+    let chain = dir.path().join("chain.toml").display().to_string();
+    let with = |file: &str, from: &str, to: &str, words: &[&str]| {
+        let path = dir.path().join(file);
+        let shipped = fs::read_to_string(&path).unwrap();
+        assert!(shipped.contains(from), "{file} holds {from:?}");
+        fs::write(&path, shipped.replacen(from, to, 1)).unwrap();
+        refused(&["run", "--chain", &chain, "--sweeps", "1"], words);
+        fs::write(&path, shipped).unwrap();
+    };
+    with("chain.toml", "queue_parts = 4", "queue_parts = 0", &["chain.toml", "queue_parts is 0", "2 to 256"]);
+    with("chain.toml", "sectors = 1", "sektors = 1", &["chain.toml", "sektors"]);
+    with("chain.toml", r#"reads = "Clusters""#, r#"reads = "Truth""#, &["chain.toml", "Truth"]);
+    with("chain.toml", r#"name = "extractor""#, r#"name = "extraktor""#, &["extraktor"]);
+    with("stages/clusterer.toml", "range_d_m = 1.0", "range_d_m = -1.0", &["stages/clusterer.toml", "range_d_m", "-1"]);
+    with("stages/clusterer.toml", "range_d_m = 1.0", "range_d = 1.0", &["stages/clusterer.toml", "range_d"]);
+    with("scenes/default.toml", "dropout", "dropuot", &["scenes/default.toml", "dropuot"]);
+    with(
+        "stages/extractor.toml",
+        "spacing_deg = 0.72",
+        "spacing_deg = 0.5",
+        &["paper-svm", "spacing_deg = 0.72", "0.5"],
+    );
+    with("models/paper-svm/card.toml", "sha256 = \"", "sha256 = \"0", &["paper-svm", "sha256"]);
+    with("stages/classifier.toml", "\"paper-svm\"", "\"paper-none\"", &["paper-none"]);
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_named() {
+    refused_in_one_line(
+        &["run", "--sweeps", "1", "--detections", "/no/such/folder/d.jsonl"],
+        &["/no/such/folder/d.jsonl"],
+    );
+    refused_in_one_line(&["run", "--sweeps", "1", "--report", "/no/such/folder/r.json"], &["/no/such/folder/r.json"]);
+}
+
+#[test]
+fn an_output_never_destroys_the_source_or_another_output() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    fs::write(path("s.csv"), "x,y,z\n1,2,3\n").unwrap();
+    let (source, folder) = (path("s.csv"), path(""));
+    refused_in_one_line(&["run", "--from", &source, "--labels", &source], &["--labels", "the source"]);
+    refused_in_one_line(&["run", "--from", &folder, "--detections", &source], &["--detections", "the source"]);
+    assert_eq!(fs::read_to_string(&source).unwrap(), "x,y,z\n1,2,3\n");
+    let both = path("out");
+    refused_in_one_line(&["run", "--detections", &both, "--report", &both], &["--report", "--detections"]);
+    let report = path("r.json");
+    fs::write(&report, "old").unwrap();
+    refused(&["run", "--report", &report, "--instance", "a/b"], &["a/b"]);
+    assert_eq!(fs::read_to_string(&report).unwrap(), "old");
+}
+
+#[test]
+fn wrong_words_on_the_command_line_are_refused_with_usage() {
+    refused(&["run", "--paec", "fast"], &["--paec", "--pace"]);
+    refused(&["run", "--duration", "30"], &["30", "500ms"]);
+    refused(&["run", "--instance", "a/b"], &["a/b", "letters"]);
+    refused(&["inject", "kill", "clusterer", "--instance", "nobody"], &["nobody", "running"]);
+    refused(&["ctl", "status", "--instance", "nobody"], &["nobody"]);
+    refused(&["run", "--sectors", "0"], &["sectors is 0"]);
+    // An option that would change nothing is a mistake.
+    refused_in_one_line(&["run", "--loop"], &["--loop", "recording"]);
+    refused_in_one_line(&["run", "--sensor", "vlp-16"], &["--sensor", "recording"]);
+    refused_in_one_line(&["run", "--from", "Cargo.toml.none", "--seed", "3"], &["Cargo.toml.none"]);
+    refused_in_one_line(&["run", "--from", "tests", "--seed", "3"], &["--seed", "scene"]);
+}
+
+#[test]
+fn two_chains_do_not_share_a_name() {
+    let run = support::Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(1);
+    refused_in_one_line(&["run", "--instance", &run.instance], &[&run.instance, "is running"]);
+    let stop = encke().args(["ctl", "stop", "--instance", &run.instance]).status().unwrap();
+    assert!(stop.success());
+    run.collect(child).expect_code(0);
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    for command in ["run", "stage", "simulate", "train", "inject", "ctl"] {
+        let output = encke().args([command, "--help"]).output().unwrap();
+        assert!(output.status.success());
+        assert!(text(&output.stdout).contains(&format!("encke {command}")), "{command}");
+    }
+    let version = text(&encke().arg("--version").output().unwrap().stdout);
+    assert_eq!(version.trim(), concat!("encke ", env!("CARGO_PKG_VERSION")));
+}

@@ -1,0 +1,294 @@
+//! Faults on purpose: what dies is restarted, what is lost is named, what is swallowed is found out.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use runtime::clock;
+use rustix::process::{Pid, Signal, kill_process};
+use support::Run;
+
+const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+
+#[test]
+fn a_killed_stage_is_back_and_the_ledger_names_what_was_lost() {
+    for stage in STAGES {
+        let run = Run::new(&["--duration", "forever"]);
+        let child = run.start();
+        run.wait_for_sweeps(5);
+        run.inject(&["kill", stage]);
+        run.wait_for(|status| {
+            let stages = status["stages"].as_array().unwrap();
+            let killed = stages.iter().find(|s| s["stage"] == stage).unwrap();
+            killed["restarts"] == 1 && killed["state"] == "running"
+        });
+        let before = run.status().unwrap()["stages"][4]["received"].as_u64().unwrap();
+        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > before + 5);
+        super_stop(&run);
+        let run = run.collect(child).expect_code(0);
+        assert!(run.is_closed(), "{stage}: {}", run.stdout());
+        assert_eq!(run.process(stage)["restarts"], 1);
+        assert_eq!(run.process(stage)["pids"].as_array().unwrap().len(), 2);
+        let published = run.report["sweeps"].as_u64().unwrap();
+        assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{stage}: {}", run.stdout());
+        assert!(run.sweeps().windows(2).all(|pair| pair[0] < pair[1]), "sweep numbers go on rising");
+    }
+}
+
+#[test]
+fn a_stage_that_swallows_a_part_leaves_the_ledger_open() {
+    for stage in STAGES {
+        let run = Run::new(&["--duration", "forever"]);
+        let child = run.start();
+        run.wait_for_sweeps(5);
+        run.inject(&["swallow", stage]);
+        let now = run.status().unwrap()["sweep"].as_u64().unwrap();
+        run.wait_for_sweeps(now + 5);
+        super_stop(&run);
+        let run = run.collect(child).expect_code(1);
+        assert!(!run.is_closed());
+        // What the source swallows is missing on the first hop.
+        let hop = if stage == "source" { "clusterer" } else { stage };
+        assert_eq!(run.hop(hop)["open"], 1, "{stage}");
+        assert!(run.stdout().contains("ledger OPEN"));
+    }
+}
+
+#[test]
+fn a_slow_stage_loses_nothing_at_fast_pace_and_changes_no_byte() {
+    let args = ["--from", "config/scenes/box.toml", "--sweeps", "200", "--pace", "fast"];
+    let plain = Run::new(&args).finish().expect_code(0);
+    let run = Run::new(&args);
+    let child = run.start();
+    run.wait_for_sweeps(1);
+    run.inject(&["slow", "classifier", "--by", "20ms"]);
+    let slow = run.collect(child).expect_code(0);
+    assert_eq!(slow.missing(), 0);
+    assert_eq!(plain.bytes, slow.bytes);
+}
+
+#[test]
+fn a_stopped_stage_is_charged_with_every_sweep_that_it_held_up() {
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(10);
+    run.inject(&["stop", "clusterer", "--for", "500ms"]);
+    let now = run.status().unwrap()["sweep"].as_u64().unwrap();
+    run.wait_for_sweeps(now + 5);
+    super_stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed());
+    // Five sweeps came due while it stood still: the first did not fit into the queue of four, the others were late by
+    // 400 ms and less. A clock that started with each sweep's processing would have seen one.
+    let late = run.report["worst_sweeps"].as_array().unwrap().iter();
+    let late = late.filter(|worst| worst["cause"].as_str().unwrap().starts_with("clusterer"));
+    let times: Vec<f64> = late.map(|worst| worst["end_to_end_ms"].as_f64().unwrap()).collect();
+    let dropped = support::sum(&run.hop("clusterer")["dropped"]);
+    assert!(times.iter().filter(|&&ms| ms > 100.0).count() as u64 + dropped >= 4, "{times:?}, {dropped} dropped");
+    assert!(times.len() as u64 + dropped >= 5, "{times:?}, {dropped} dropped");
+    assert!(run.report["deadline"]["misses"].as_u64().unwrap() >= 4);
+}
+
+#[test]
+fn a_stage_that_keeps_dying_ends_the_run() {
+    let run = Run::new(&["--duration", "forever"]);
+    let mut child = run.start();
+    run.wait_for_sweeps(2);
+    let mut kills = 0;
+    while child.try_wait().unwrap().is_none() {
+        assert!(kills < 50, "an endless restart loop");
+        let before = kills;
+        run.wait_for_or_end(&mut child, |status| {
+            let stage = &status["stages"][2];
+            stage["restarts"].as_u64() == Some(before) && stage["state"] == "running"
+        });
+        if child.try_wait().unwrap().is_none() {
+            let _ =
+                support::encke().args(["inject", "kill", "extractor", "--instance", &run.instance]).output().unwrap();
+        }
+        kills += 1;
+    }
+    let run = run.collect(child).expect_code(1);
+    assert!(run.is_closed(), "{}", run.stdout());
+    assert!(run.stderr().contains("\"extractor\" died more than 10 times"), "{}", run.stderr());
+}
+
+fn super_stop(run: &Run) {
+    let stop = support::encke().args(["ctl", "stop", "--instance", &run.instance]).status().unwrap();
+    assert!(stop.success());
+}
+
+#[test]
+fn what_a_killed_supervisor_leaves_is_removed() {
+    let run = Run::new(&["--duration", "forever"]);
+    let mut child = run.start();
+    run.wait_for_sweeps(3);
+    let stages = run.status().unwrap()["stages"].as_array().unwrap().clone();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    // The next chain, whatever its name, cleans up.
+    Run::new(&["--sweeps", "2", "--pace", "fast"]).finish().expect_code(0);
+    assert!(support::leftovers(&run.instance).is_empty());
+    for stage in stages {
+        let line = std::fs::read(format!("/proc/{}/cmdline", stage["pid"])).unwrap_or_default();
+        assert!(!support::text(&line).contains(&run.instance), "a stage outlived its supervisor: {stage}");
+    }
+}
+
+/// Kills of each stage in the test below; `ENCKE_KILLS=50` makes a campaign of it.
+fn kills() -> u32 {
+    std::env::var("ENCKE_KILLS").map_or(6, |kills| kills.parse().unwrap())
+}
+
+#[test]
+fn kills_at_random_moments_start_up_included_keep_the_ledger_closed() {
+    let chain = endless_restarts();
+    for (seed, stage) in STAGES.iter().enumerate() {
+        let run = Run::new(&["--duration", "forever", "--chain", chain.path().join("chain.toml").to_str().unwrap()]);
+        let child = run.start();
+        run.wait_for_sweeps(1);
+        let mut state = seed as u64 + 1;
+        let mut deaths = 0;
+        let mut back_after_ms = Vec::new();
+        for kill in 0..kills() {
+            let before = received(&run);
+            let killed_ns = clock::now_ns();
+            // Whoever lives is killed, connected or not.
+            let pid = run.status().unwrap()["stages"][seed]["pid"].as_i64().unwrap();
+            let killed = Pid::from_raw(pid as i32).is_some_and(|pid| kill_process(pid, Signal::KILL).is_ok());
+            deaths += u64::from(killed);
+            if kill % 2 == 0 {
+                // Two sweeps: one may have been on its way.
+                run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > before + 1);
+                back_after_ms.push((clock::now_ns() - killed_ns) / 1_000_000);
+            }
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            std::thread::sleep(std::time::Duration::from_millis(state >> 57));
+        }
+        assert!(deaths >= u64::from(kills()) / 2, "{stage}: {deaths} deaths");
+        println!("{stage}: output again after at most {:?} ms", back_after_ms.iter().max());
+        let now = received(&run);
+        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+        super_stop(&run);
+        let run = run.collect(child).expect_code(0);
+        assert!(run.is_closed(), "{stage}: {}", run.stdout());
+        assert!(run.process(stage)["restarts"].as_u64().unwrap() >= u64::from(kills()) / 3);
+        let published = run.report["sweeps"].as_u64().unwrap();
+        assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{stage}: {}", run.stdout());
+    }
+}
+
+fn received(run: &Run) -> u64 {
+    run.status().unwrap()["stages"][4]["received"].as_u64().unwrap()
+}
+
+#[test]
+fn a_death_in_doubt_is_settled_once() {
+    // The reader stands still while its writer dies: nobody can say whether the last part was sent.
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    for stage in ["clusterer", "extractor"] {
+        let next = STAGES[STAGES.iter().position(|name| *name == stage).unwrap() + 1];
+        std::thread::scope(|scope| {
+            scope.spawn(|| run.inject(&["stop", next, "--for", "900ms"]));
+            std::thread::sleep(std::time::Duration::from_millis(150));
+            run.inject(&["kill", stage]);
+        });
+        let now = received(&run);
+        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+    }
+    super_stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    let published = run.report["sweeps"].as_u64().unwrap();
+    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+}
+
+#[test]
+fn all_stages_killed_at_once_come_back_and_the_ledger_closes() {
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    let status = run.status().unwrap();
+    for stage in status["stages"].as_array().unwrap() {
+        kill_process(Pid::from_raw(stage["pid"].as_i64().unwrap() as i32).unwrap(), Signal::KILL).unwrap();
+    }
+    let now = received(&run);
+    run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+    super_stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    let published = run.report["sweeps"].as_u64().unwrap();
+    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+}
+
+#[test]
+fn parts_swallowed_at_fast_pace_end_the_run_instead_of_hanging_it() {
+    let run = Run::new(&["--sweeps", "100000", "--pace", "fast"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    for _ in 0..2 {
+        run.inject(&["swallow", "extractor"]);
+    }
+    let run = run.collect(child).expect_code(1);
+    assert!(!run.is_closed());
+    assert_eq!(run.hop("extractor")["open"], 2);
+}
+
+#[test]
+fn a_death_at_fast_pace_names_what_it_cost_and_the_run_goes_on() {
+    let run = Run::new(&["--from", "config/scenes/box.toml", "--sweeps", "400", "--pace", "fast"]);
+    let child = run.start();
+    run.wait_for_sweeps(20);
+    run.inject(&["slow", "classifier", "--by", "5ms"]);
+    for _ in 0..3 {
+        run.inject(&["kill", "clusterer"]);
+        let now = received(&run);
+        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+    }
+    let run = run.collect(child).expect_code(1); // what a death costs is no success at fast pace
+    assert!(run.is_closed(), "{}", run.stdout());
+    assert_eq!(run.report["sweeps"], 400);
+    assert_eq!(run.sweeps().len() as u64 + run.missing(), 400);
+    let dropped: u64 = STAGES[1..].iter().map(|stage| support::sum(&run.hop(stage)["dropped"])).sum();
+    assert_eq!(dropped, 0, "the window holds through deaths");
+}
+
+#[test]
+fn duration_counts_from_the_runs_first_sweep_whoever_made_it() {
+    let run = Run::new(&["--duration", "3s"]);
+    let child = run.start();
+    run.wait_for_sweeps(15);
+    run.inject(&["kill", "source"]);
+    let run = run.collect(child).expect_code(0);
+    let sweeps = run.report["sweeps"].as_u64().unwrap();
+    assert!(sweeps <= 30, "3 s of sensor time are 30 sweeps, not {sweeps}");
+}
+
+#[test]
+fn stages_that_somebody_else_starts_may_come_in_any_order() {
+    let run = Run::new(&["--no-spawn", "--sweeps", "30", "--pace", "fast"]);
+    let child = run.start();
+    let mut stages: Vec<_> = STAGES
+        .iter()
+        .map(|stage| support::encke().args(["stage", stage, "--instance", &run.instance]).spawn().unwrap())
+        .collect();
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed());
+    assert_eq!(run.missing(), 0);
+    assert_eq!(run.sweeps().len(), 30);
+    for stage in &mut stages {
+        assert!(stage.wait().unwrap().success());
+    }
+}
+
+/// A copy of the configuration in which stages may die as often as they like.
+fn endless_restarts() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let shipped = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/config/chain.toml")).unwrap();
+    let text = shipped.replace("restarts = 10", "restarts = 1000");
+    assert_ne!(text, shipped);
+    std::fs::write(dir.path().join("chain.toml"), text).unwrap();
+    dir
+}

@@ -1,0 +1,208 @@
+//! Runs `encke` as its user does: real processes, real shared memory, an instance and a folder of its own each.
+
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "each test file uses what it needs, and may panic")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use serde_json::Value;
+
+static RUNS: AtomicU32 = AtomicU32::new(0);
+
+/// One run of the chain, with a folder for its outputs.
+pub struct Run {
+    pub dir: tempfile::TempDir,
+    pub instance: String,
+    args: Vec<String>,
+}
+
+/// What a run left behind.
+pub struct Finished {
+    pub output: Output,
+    pub report: Value,
+    /// The detections' lines.
+    pub detections: Vec<Value>,
+    /// The same, as bytes.
+    pub bytes: Vec<u8>,
+    pub labels: String,
+}
+
+impl Run {
+    /// A run with these arguments after `encke run`, writing detections and a report.
+    pub fn new(args: &[&str]) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let number = RUNS.fetch_add(1, Ordering::Relaxed);
+        let instance = format!("t{}-{number}", std::process::id());
+        let mut args: Vec<String> = args.iter().map(|arg| (*arg).to_owned()).collect();
+        for (flag, file) in [("--detections", "d.jsonl"), ("--report", "r.json")] {
+            args.extend([flag.to_owned(), dir.path().join(file).display().to_string()]);
+        }
+        args.extend(["--instance".to_owned(), instance.clone()]);
+        Self { dir, instance, args }
+    }
+
+    /// Also writes labels.
+    pub fn with_labels(mut self) -> Self {
+        self.args.extend(["--labels".to_owned(), self.dir.path().join("l.csv").display().to_string()]);
+        self
+    }
+
+    /// Starts it.
+    pub fn start(&self) -> Child {
+        let mut command = encke();
+        command.arg("run").args(&self.args).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    }
+
+    /// Runs it to its end.
+    pub fn finish(self) -> Finished {
+        let child = self.start();
+        self.collect(child)
+    }
+
+    /// Waits for its end and reads what it left.
+    pub fn collect(self, mut child: Child) -> Finished {
+        // A run that hangs is a failure, not a long test. Its output fits into the pipes.
+        let mut looks = 0;
+        while child.try_wait().unwrap().is_none() {
+            looks += 1;
+            if looks > 6_000 {
+                child.kill().unwrap();
+                panic!("the run did not end within 120 s: {}", text(&child.wait_with_output().unwrap().stderr));
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let output = child.wait_with_output().unwrap();
+        let read = |file: &str| std::fs::read(self.dir.path().join(file)).unwrap_or_default();
+        let bytes = read("d.jsonl");
+        let lines = std::str::from_utf8(&bytes).unwrap().lines();
+        let detections = lines.map(|line| serde_json::from_str(line).unwrap()).collect();
+        let report = serde_json::from_slice(&read("r.json")).unwrap_or(Value::Null);
+        let labels = String::from_utf8(read("l.csv")).unwrap();
+        let left = leftovers(&self.instance);
+        assert!(left.is_empty(), "left in shared memory or on disk: {left:?}");
+        Finished { output, report, detections, bytes, labels }
+    }
+
+    /// Waits until the source has sent so many sweeps.
+    pub fn wait_for_sweeps(&self, sweeps: u64) {
+        self.wait_for(|status| status["sweep"].as_u64().unwrap() >= sweeps);
+    }
+
+    /// Waits until the running chain's status is as wanted.
+    pub fn wait_for(&self, wanted: impl Fn(&Value) -> bool) {
+        for _ in 0..1_500 {
+            if self.status().is_some_and(|status| wanted(&status)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("the chain did not get there in 30 s: {:?}", self.status());
+    }
+
+    /// The same, or until the run has ended by itself.
+    pub fn wait_for_or_end(&self, child: &mut Child, wanted: impl Fn(&Value) -> bool) {
+        for _ in 0..1_500 {
+            let ended = child.try_wait().unwrap().is_some();
+            if ended || self.status().is_some_and(|status| wanted(&status)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("the chain neither got there nor ended in 30 s: {:?}", self.status());
+    }
+
+    /// The running chain's status; none before it is up.
+    pub fn status(&self) -> Option<Value> {
+        let output = encke().args(["ctl", "status", "--json", "--instance", &self.instance]).output().unwrap();
+        serde_json::from_slice(&output.stdout).ok()
+    }
+
+    /// Puts a fault into it.
+    pub fn inject(&self, args: &[&str]) {
+        let output = encke().arg("inject").args(args).args(["--instance", &self.instance]).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+}
+
+impl Finished {
+    /// Asserts its exit code, showing what it said otherwise.
+    pub fn expect_code(self, code: i32) -> Self {
+        assert_eq!(self.output.status.code(), Some(code), "{}{}", self.stdout(), self.stderr());
+        self
+    }
+
+    pub fn stdout(&self) -> String {
+        text(&self.output.stdout)
+    }
+
+    pub fn stderr(&self) -> String {
+        text(&self.output.stderr)
+    }
+
+    /// Whether the ledger says that every part has its place.
+    pub fn is_closed(&self) -> bool {
+        self.report["ledger"]["closed"] == true
+    }
+
+    /// A hop of the ledger, by the stage that reads.
+    pub fn hop(&self, stage: &str) -> &Value {
+        self.report["ledger"]["hops"].as_array().unwrap().iter().find(|hop| hop["stage"] == stage).unwrap()
+    }
+
+    /// Parts dropped or lost on any hop.
+    pub fn missing(&self) -> u64 {
+        let hops = self.report["ledger"]["hops"].as_array().unwrap().iter();
+        hops.map(|hop| hop["lost"].as_u64().unwrap() + sum(&hop["dropped"])).sum()
+    }
+
+    /// A process of the report.
+    pub fn process(&self, stage: &str) -> &Value {
+        self.report["processes"].as_array().unwrap().iter().find(|process| process["stage"] == stage).unwrap()
+    }
+
+    /// The sweeps that have a line, in the order of the file.
+    pub fn sweeps(&self) -> Vec<u64> {
+        self.detections.iter().map(|line| line["sweep"].as_u64().unwrap()).collect()
+    }
+}
+
+/// The sum of an object's numbers.
+pub fn sum(object: &Value) -> u64 {
+    object.as_object().unwrap().values().map(|value| value.as_u64().unwrap()).sum()
+}
+
+/// The executable under test.
+pub fn encke() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_encke"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
+    command
+}
+
+/// What an instance left in shared memory or on disk.
+pub fn leftovers(instance: &str) -> Vec<String> {
+    let instance = transport::Instance::named(instance).unwrap();
+    let mut left = instance.shared_memory();
+    left.extend(instance.dir().exists().then(|| instance.dir().display().to_string()));
+    left
+}
+
+/// A file of the recorded data: in `$ENCKE_DATA`, or `../shared/data` beside the repository. None, with a word about
+/// it, where the data are not there; with `ENCKE_DATA_REQUIRED` set that is a failure.
+pub fn recorded(path: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("ENCKE_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let file = root.join(path);
+    if file.exists() {
+        return Some(file);
+    }
+    assert!(std::env::var_os("ENCKE_DATA_REQUIRED").is_none(), "{}: recorded data are required", file.display());
+    eprintln!("skipped: {} is not there (set ENCKE_DATA to the folder of recorded data)", file.display());
+    None
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
