@@ -4,7 +4,7 @@
 //! and their azimuths by at most asin(d/h), whatever the range of q. So of each pair the one whose column comes later,
 //! looking back over its own window, finds the other; across the seam it is the one just after the seam.
 
-use lidar::{MAX_COLUMNS, MAX_RETURNS};
+use lidar::{MAX_COLUMNS, MAX_RETURNS, Return};
 use messages::Sweep;
 
 use crate::distance::ROUNDING;
@@ -126,15 +126,22 @@ impl ScanWindow {
             self.slack.include(r.ring, elevation_sine, azimuth_sine);
             self.reaches.push(Reach { azimuth_rad: arcsine_above(reach_m / h_m), elevation_sine: reach_m / range_m });
             // Two returns of one firing: there is one pixel only.
-            if !self.image.put(r.ring, r.column, r.position(), place) {
+            if !self.image.put(r.ring, r.column, r.position(), range_m, place) {
                 return false;
             }
         }
         true
     }
 
-    fn seeker(&self, position: [f32; 3]) -> Seeker {
-        Seeker { position, within_m2: self.range_d_m * self.range_d_m }
+    /// By the triangle inequality, ranges of returns within d differ by at most d; ranges round as distances do.
+    fn seeker(&self, r: &Return) -> Seeker {
+        let (range_m, reach_m) = (r.range_m(), self.range_d_m * ROUNDING);
+        Seeker {
+            position: r.position(),
+            within_m2: self.range_d_m * self.range_d_m,
+            near_m: range_m / ROUNDING - reach_m,
+            far_m: range_m * ROUNDING + reach_m,
+        }
     }
 
     /// Close returns with each other and with all they can reach.
@@ -145,7 +152,7 @@ impl ScanWindow {
             if sets.count() == lone + 1 {
                 return;
             }
-            let seeker = self.seeker(sweep.returns[place as usize].position());
+            let seeker = self.seeker(&sweep.returns[place as usize]);
             let root = sets.root(place);
             self.image.join_close(sets, seeker, root);
         }
@@ -160,7 +167,7 @@ impl ScanWindow {
             }
             let own = usize::from(r.ring);
             let mut window = Window {
-                seeker: self.seeker(r.position()),
+                seeker: self.seeker(r),
                 column: usize::from(r.column),
                 last_column: sweep.columns.len() - 1,
                 earliest_rad: self.turn.travel_rad(usize::from(r.column)) - reach.azimuth_rad,

@@ -240,6 +240,25 @@ fn neighbours_at_the_very_edge_of_the_window_in_elevation_are_found() {
     }
 }
 
+// verifies CLU-002
+#[test]
+fn neighbours_at_the_very_edge_of_the_range_are_found() {
+    const COLUMNS: usize = 4_000;
+    let mut pairs = Pairs::new(1, COLUMNS);
+    pairs.sweep.rings[0].elevation_rad = 0.0;
+    for (apart, near) in [(1, 1.1_f64), (1, 4.0), (8, 1.1), (20, 2.0), (40, 3.0)] {
+        let apart_rad = apart as f64 * TAU / COLUMNS as f64;
+        // Almost on one ray, a little less than d behind each other.
+        let behind = (1.0 - (near * apart_rad.sin()).powi(2)).sqrt();
+        let far = near * apart_rad.cos() + behind - 2e-6;
+        for first in (0..COLUMNS).step_by(37).chain(COLUMNS - 45..COLUMNS) {
+            let second = (first + apart) % COLUMNS;
+            pairs.assert_joined([(0, first, near), (0, second, far)]);
+            pairs.assert_joined([(0, first, far), (0, second, near)]);
+        }
+    }
+}
+
 // verifies CLU-001
 #[test]
 fn a_distance_of_exactly_d_joins_and_one_rounding_more_does_not() {
