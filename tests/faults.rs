@@ -4,9 +4,11 @@
 
 mod support;
 
+use std::process::Child;
+
 use runtime::clock;
 use rustix::process::{Pid, Signal, kill_process};
-use support::Run;
+use support::{Finished, Run};
 
 const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
 
@@ -24,13 +26,9 @@ fn a_killed_stage_is_back_and_the_ledger_names_what_was_lost() {
         });
         let before = run.status().unwrap()["stages"][4]["received"].as_u64().unwrap();
         run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > before + 5);
-        super_stop(&run);
-        let run = run.collect(child).expect_code(0);
-        assert!(run.is_closed(), "{stage}: {}", run.stdout());
+        let run = stop_with_every_sweep_accounted_for(run, child);
         assert_eq!(run.process(stage)["restarts"], 1);
         assert_eq!(run.process(stage)["pids"].as_array().unwrap().len(), 2);
-        let published = run.report["sweeps"].as_u64().unwrap();
-        assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{stage}: {}", run.stdout());
         assert!(run.sweeps().windows(2).all(|pair| pair[0] < pair[1]), "sweep numbers go on rising");
     }
 }
@@ -169,13 +167,19 @@ fn kills_at_random_moments_start_up_included_keep_the_ledger_closed() {
         println!("{stage}: output again after at most {:?} ms", back_after_ms.iter().max());
         let now = received(&run);
         run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
-        super_stop(&run);
-        let run = run.collect(child).expect_code(0);
-        assert!(run.is_closed(), "{stage}: {}", run.stdout());
+        let run = stop_with_every_sweep_accounted_for(run, child);
         assert!(run.process(stage)["restarts"].as_u64().unwrap() >= u64::from(kills()) / 3);
-        let published = run.report["sweeps"].as_u64().unwrap();
-        assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{stage}: {}", run.stdout());
     }
+}
+
+/// Stops the chain: the ledger is closed, and each sweep has a line or is named as missing.
+fn stop_with_every_sweep_accounted_for(run: Run, child: Child) -> Finished {
+    super_stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    let published = run.report["sweeps"].as_u64().unwrap();
+    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+    run
 }
 
 fn received(run: &Run) -> u64 {
@@ -198,11 +202,7 @@ fn a_death_in_doubt_is_settled_once() {
         let now = received(&run);
         run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
     }
-    super_stop(&run);
-    let run = run.collect(child).expect_code(0);
-    assert!(run.is_closed(), "{}", run.stdout());
-    let published = run.report["sweeps"].as_u64().unwrap();
-    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+    stop_with_every_sweep_accounted_for(run, child);
 }
 
 #[test]
@@ -216,11 +216,7 @@ fn all_stages_killed_at_once_come_back_and_the_ledger_closes() {
     }
     let now = received(&run);
     run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
-    super_stop(&run);
-    let run = run.collect(child).expect_code(0);
-    assert!(run.is_closed(), "{}", run.stdout());
-    let published = run.report["sweeps"].as_u64().unwrap();
-    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+    stop_with_every_sweep_accounted_for(run, child);
 }
 
 #[test]
