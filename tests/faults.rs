@@ -70,21 +70,22 @@ fn a_stopped_stage_is_charged_with_every_sweep_that_it_held_up() {
     let run = Run::new(&["--duration", "forever"]);
     let child = run.start();
     run.wait_for_sweeps(10);
-    run.inject(&["stop", "clusterer", "--for", "500ms"]);
+    run.inject(&["stop", "clusterer", "--for", "600ms"]);
     let now = run.status().unwrap()["sweep"].as_u64().unwrap();
     run.wait_for_sweeps(now + 5);
-    super_stop(&run);
-    let run = run.collect(child).expect_code(0);
-    assert!(run.is_closed());
-    // Five sweeps came due while it stood still: the first did not fit into the queue of four, the others were late by
-    // 400 ms and less. A clock that started with each sweep's processing would have seen one.
-    let late = run.report["worst_sweeps"].as_array().unwrap().iter();
-    let late = late.filter(|worst| worst["cause"].as_str().unwrap().starts_with("clusterer"));
-    let times: Vec<f64> = late.map(|worst| worst["end_to_end_ms"].as_f64().unwrap()).collect();
-    let dropped = support::sum(&run.hop("clusterer")["dropped"]);
-    assert!(times.iter().filter(|&&ms| ms > 100.0).count() as u64 + dropped >= 4, "{times:?}, {dropped} dropped");
-    assert!(times.len() as u64 + dropped >= 5, "{times:?}, {dropped} dropped");
-    assert!(run.report["deadline"]["misses"].as_u64().unwrap() >= 4);
+    let run = stop_with_every_sweep_accounted_for(run, child);
+    // Six sweeps come due while it stands still. The first two do not fit into the queue of four; of the others at least
+    // three wait for more than the deadline of 100 ms, whatever the phase. A clock that started with each sweep's
+    // processing would have seen one.
+    let deadline = &run.report["deadline"];
+    assert!(deadline["misses"].as_u64().unwrap() >= 5, "{deadline}");
+    let causes = deadline["causes"].as_object().unwrap().iter();
+    let charged: u64 =
+        causes.filter(|(cause, _)| cause.starts_with("clusterer")).map(|(_, n)| n.as_u64().unwrap()).sum();
+    assert!(charged >= 5, "{deadline}");
+    let worst = &run.report["worst_sweeps"][0];
+    assert!(worst["end_to_end_ms"].as_f64().unwrap() > 200.0, "{worst}");
+    assert!(worst["cause"].as_str().unwrap().starts_with("clusterer"), "{worst}");
 }
 
 #[test]
