@@ -15,6 +15,8 @@
 //! assert!(posterior[1] > 0.99);
 //! ```
 
+mod boosted_trees;
+mod boosted_trees_file;
 mod card;
 mod coupling;
 mod exponential;
@@ -26,6 +28,11 @@ mod room;
 mod svm;
 mod svm_file;
 
+pub use boosted_trees::{
+    BoostedTrees, BoostedTreesError, MAX_FEATURES, MAX_NODES, MAX_ROUNDS, MAX_TEMPERATURE, MIN_TEMPERATURE, TreeError,
+    TreeNode, softmax,
+};
+pub use boosted_trees_file::BoostedTreesFileError;
 pub use card::{Card, CardError, FORMAT, FeatureDefinition, NORMALISATION};
 pub use coupling::{couple, pairwise_probability};
 pub use model::{Judgement, Model, ModelError, SolidSvm};
