@@ -14,9 +14,11 @@
 //! # }
 //! ```
 
+mod calibrate;
 mod confusion;
 mod fit_naive_bayes;
 mod fit_svm;
+mod fit_trees;
 mod observe;
 mod paper;
 mod parallel;
@@ -26,7 +28,9 @@ mod sets;
 mod svm_text;
 mod train;
 
+pub use calibrate::{RELIABILITY_BINS, Reliability, ReliabilityBin, best_temperature, log_loss};
 pub use confusion::Confusion;
+pub use fit_trees::{BoostingParams, FitTreesError, FittedTrees, LabelledRows, RoundLoss, fit_trees};
 pub use observe::{Example, ObserveError, Observer, Seen, View};
 pub use paper::{Choice, Converged, Files, FourClass, Reproduction, RunNote, TwoClass, reproduce};
 pub use plan::{NaiveBayesPlan, PlanError, ReproductionPlan, SvmPlan, TrainPlan};
