@@ -6,15 +6,11 @@
 //! fixed blocks of rows, and sums are taken in the order of rows and blocks.
 
 mod bins;
-#[cfg(test)]
-mod exact;
 mod grow;
 mod histogram;
 mod params;
 mod rows;
 mod scored;
-#[cfg(test)]
-mod tests;
 
 use classifier::{BoostedTrees, BoostedTreesError, TreeNode};
 use lidar::ObstacleClass;
@@ -197,14 +193,15 @@ fn sample(random: &mut ChaCha8Rng, share: f64, count: u32) -> Vec<u32> {
     let mut wanted = ((share * f64::from(count)).round() as u32).clamp(1, count);
     let mut chosen = Vec::with_capacity(wanted as usize);
     for number in 0..count {
-        let left = count - number;
-        if wanted == left || random.random_range(0..left) < wanted {
+        if random.random_range(0..count - number) < wanted {
             chosen.push(number);
             wanted -= 1;
-            if wanted == 0 {
-                break;
-            }
         }
     }
     chosen
 }
+
+#[cfg(test)]
+mod exact;
+#[cfg(test)]
+mod tests;

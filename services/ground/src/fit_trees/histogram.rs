@@ -153,3 +153,58 @@ impl Histogram {
         best
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::super::bins::Quantiles;
+    use super::super::tests::params;
+    use super::super::{AllCores, LabelledRows};
+    use super::*;
+
+    #[test]
+    fn the_rest_of_a_histogram_is_that_of_the_other_rows_and_no_split_stands_behind_an_empty_bin() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut splits = 0;
+        for _ in 0..50 {
+            let features: Vec<f32> = (0..400).map(|_| random.random_range(0..100) as f32).collect();
+            // Of many orders of magnitude: what is left of an empty bin is not 0.
+            let gradients: Vec<[f32; 2]> = (0..200)
+                .map(|_| {
+                    let size = 10.0_f32.powi(random.random_range(-12..1));
+                    [size * random.random_range(-1.0..1.0), size * random.random_range(0.1..1.0)]
+                })
+                .collect();
+            let table = LabelledRows { features: &features, classes: &[0; 200], weights: None };
+            let binned = Quantiles::of(&AllCores, &table, 2).bin(&AllCores, &table);
+            let of = |is_in: fn(&u32) -> bool| {
+                let rows: Vec<u32> = (0..200).filter(is_in).collect();
+                let gradients: Vec<[f32; 2]> = rows.iter().map(|&row| gradients[row as usize]).collect();
+                let mut whole = Sum::default();
+                gradients.iter().for_each(|&derivatives| whole.add_row(derivatives));
+                (Histogram::of(&binned, &[0, 1], &rows, &gradients), rows, whole)
+            };
+            // A grandchild.
+            let rest =
+                of(|_| true).0.without(&of(|row| row % 2 == 0).0).without(&of(|row| row % 14 < 12 && row % 2 == 1).0);
+            let (expected, rows, whole) = of(|row| row % 14 == 13);
+            for (found, expected) in rest.sums.iter().zip(&expected.sums) {
+                assert_eq!(found.rows, expected.rows);
+                assert!((found.gradient - expected.gradient).abs() < 1e-9);
+                assert!((found.hessian - expected.hessian).abs() < 1e-9);
+            }
+            let params = BoostingParams { min_rows: 2, lambda_l2: 0.0, ..params() };
+            let best = |histogram: &Histogram| {
+                histogram.best_split(&binned, &[0, 1], &whole, &params).map(|split| (split.feature, split.bin))
+            };
+            assert_eq!(best(&rest), best(&expected));
+            if let Some((feature, bin)) = best(&rest) {
+                assert!(rows.iter().any(|&row| binned.column(feature)[row as usize] == bin));
+                splits += 1;
+            }
+        }
+        assert!(splits > 25, "{splits}");
+    }
+}
