@@ -79,15 +79,18 @@ fn extractor(plan: &Plan) -> Result<Extractor, Failure> {
 }
 
 fn classifier(plan: &Plan, assets: &Assets) -> Result<Classifier, Failure> {
-    init::<Classifier>(plan, |params| {
-        let folder = format!("models/{}", params.model);
-        let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
-        let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
-        fits_extractor(plan, &parsed.features, &params.model)?;
-        let model = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
-        params.files = Some(ModelFiles { card, model });
-        Ok(())
-    })
+    init::<Classifier>(plan, |params| add_model(plan, assets, params))
+}
+
+/// Reads the files of the model that the parameters name.
+pub(crate) fn add_model(plan: &Plan, assets: &Assets, params: &mut classifier::Params) -> Result<(), Failure> {
+    let folder = format!("models/{}", params.model);
+    let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
+    let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
+    fits_extractor(plan, &parsed.features, &params.model)?;
+    let model = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
+    params.files = Some(ModelFiles { card, model });
+    Ok(())
 }
 
 /// A model judges only what the extractor that it was trained with describes.
@@ -107,19 +110,34 @@ fn fits_extractor(plan: &Plan, features: &FeatureDefinition, model: &str) -> Res
 }
 
 /// Reads a stage's parameters, lets `complete` add what lies in other files, and builds the stage.
-fn init<S: Stage>(plan: &Plan, complete: impl FnOnce(&mut S::Params) -> Result<(), Failure>) -> Result<S, Failure>
+pub(crate) fn init<S: Stage>(
+    plan: &Plan,
+    complete: impl FnOnce(&mut S::Params) -> Result<(), Failure>,
+) -> Result<S, Failure>
 where
     S::Params: DeserializeOwned,
 {
-    let wired = plan.chain.stages.iter().find(|stage| stage.name == S::NAME);
-    let file = wired.and_then(|stage| stage.parameters.clone()).unwrap_or_default();
-    let named = |cause: &dyn std::fmt::Display| Failure::start(format!("{file}: {}", cause.to_string().trim_end()));
+    let mut params = params::<S>(plan)?;
+    complete(&mut params)?;
+    S::init(params).map_err(|cause| in_file::<S>(plan, &cause))
+}
+
+/// A stage's parameters, as its file has them.
+pub(crate) fn params<S: Stage>(plan: &Plan) -> Result<S::Params, Failure>
+where
+    S::Params: DeserializeOwned,
+{
     let text = plan.parameters.get(S::NAME).ok_or_else(|| {
         Failure::start(format!("chain.toml: stage {:?} names no file of parameters, must name one", S::NAME))
     })?;
-    let mut params: S::Params = toml::from_str(text).map_err(|cause| named(&cause))?;
-    complete(&mut params)?;
-    S::init(params).map_err(|cause| named(&cause))
+    toml::from_str(text).map_err(|cause| in_file::<S>(plan, &cause))
+}
+
+/// What is wrong with a stage's file of parameters.
+fn in_file<S: Stage>(plan: &Plan, cause: &dyn std::fmt::Display) -> Failure {
+    let wired = plan.chain.stages.iter().find(|stage| stage.name == S::NAME);
+    let file = wired.and_then(|stage| stage.parameters.as_deref()).unwrap_or_default();
+    Failure::start(format!("{file}: {}", cause.to_string().trim_end()))
 }
 
 fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
