@@ -138,7 +138,7 @@ fn two_chains_do_not_share_a_name() {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["run", "stage", "simulate", "train", "inject", "ctl"] {
+    for command in ["run", "stage", "simulate", "train", "bench", "inject", "ctl"] {
         let output = encke().args([command, "--help"]).output().unwrap();
         assert!(output.status.success());
         assert!(text(&output.stdout).contains(&format!("encke {command}")), "{command}");

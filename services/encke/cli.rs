@@ -39,6 +39,9 @@ pub(crate) enum Command {
     /// Repeat the paper's experiments: tables and figures as a page, and as JSON.
     #[command(after_help = "Example:\n  encke evaluate --paper --out report/")]
     Evaluate(EvaluateArgs),
+    /// Time each stage's work on one sweep, without processes, on one thread.
+    #[command(after_help = BENCH_NOTES)]
+    Bench(BenchArgs),
     /// Put one fault into a running chain, to see it accounted for.
     #[command(after_help = INJECT_EXAMPLES)]
     Inject(InjectArgs),
@@ -58,6 +61,21 @@ Ctrl-C and SIGTERM stop the chain in order, drain it, and print the summary.";
 const SIMULATE_EXAMPLES: &str = "Examples:
   encke simulate --scene config/scenes/default.toml --sweeps 50 --out scene.pcap
   encke simulate --scene config/scenes/reference.toml --sweeps 5 --out sweeps/";
+
+const BENCH_NOTES: &str = "Stages, each on what those before it left:
+  cluster      the clusterer's `process`: clusters, and the cells round them
+  normals      nearest neighbours of every point, and normals; clusters with features only
+  histogram    angles of all pairs and the joint histogram, on the neighbours and normals found
+  svm          the classifier's `process` with its support vector machine, posterior included;
+               with --model: decision values and votes, no posterior
+  paper_chain  cluster, the extractor's whole `process` (normals, histogram, choice of columns), svm
+
+The sweep is a recording's first complete one (its first where none is), or a scene's first.
+Reading it is not timed. All runs must give the same output to the byte, else the exit code is 1.
+
+Examples:
+  encke bench --from config/scenes/default.toml
+  encke bench --from sweeps/s4k.csv sweeps/s70k.csv --runs 50 --range 0.5 --json";
 
 const INJECT_EXAMPLES: &str = "Faults:
   kill     SIGKILL to the stage's process
@@ -227,6 +245,38 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Print the JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Options of `encke bench`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct BenchArgs {
+    /// Scenes (.toml) or recordings, as `encke run` takes them; one sweep of each.
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    pub(crate) from: Vec<PathBuf>,
+    /// How often each stage is timed, after a few runs that are not.
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: u32,
+    /// The clusterer's range d [m]. [default: its file's range_d_m]
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub(crate) range: Option<f32>,
+    /// Clusters of fewer points get no features; under 5 none does. [default: its file's min_points]
+    #[arg(long, value_name = "N")]
+    pub(crate) min_points: Option<u32>,
+    /// Another support vector machine, in libsvm's format; it needs no card.
+    #[arg(long, value_name = "FILE.libsvm")]
+    pub(crate) model: Option<PathBuf>,
+    /// Topology and parameters: [default: ./config/chain.toml, else the one built in]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) chain: Option<PathBuf>,
+    /// Format of the recordings, where it is not to be found by content.
+    #[arg(long)]
+    pub(crate) format: Option<String>,
+    /// Sensor model of the recordings: the stem of a file in config/sensors.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sensor: Option<String>,
+    /// Print one JSON object for each stage and sweep.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -4,6 +4,7 @@
 //! 0 done, 1 the run itself failed, 2 could not start.
 
 mod assets;
+mod bench;
 mod cli;
 mod ctl;
 mod dispatch;
@@ -71,6 +72,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::simulate(&args),
         Command::Train(args) => train::train(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),
+        Command::Bench(args) => bench::bench(&args),
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
     };

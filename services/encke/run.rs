@@ -45,7 +45,7 @@ fn verdict(report: &Report, strict: bool) -> Result<(), Failure> {
 }
 
 /// Everything that the processes of the run must agree on.
-fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
+pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
     let chain = chain(args, assets)?;
     let mut parameters = BTreeMap::new();
     for stage in &chain.stages {
