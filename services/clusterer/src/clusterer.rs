@@ -44,6 +44,7 @@ impl Stage for Clusterer {
         if !input::is_consistent(&part, sweep) {
             return Verdict::RejectedMalformed;
         }
+        output.turn_columns = if sweep.header.is_complete() { sweep.columns.len() as u64 } else { 0 };
         for ring in &sweep.rings {
             // As many rings as the sweep has fit.
             let _ = output.ring_elevation_rad.push(ring.elevation_rad);

@@ -98,6 +98,8 @@ pub struct Cell {
 pub struct Clusters {
     /// As in the sweep.
     pub header: SweepHeader,
+    /// Columns of a complete sweep, whose first follows its last; 0 where the sweep is incomplete or has none.
+    pub turn_columns: u64,
     /// Elevation of each ring [rad], as in the sweep; empty in an unorganised sweep.
     pub ring_elevation_rad: Bounded<f32, { lidar::MAX_RINGS }>,
     /// The clusters.
@@ -111,10 +113,11 @@ pub struct Clusters {
 }
 
 impl Message for Clusters {
-    const TYPE: &'static str = "encke.Clusters.1";
+    const TYPE: &'static str = "encke.Clusters.2";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();
+        self.turn_columns = 0;
         self.ring_elevation_rad.clear();
         self.clusters.clear();
         self.returns.clear();

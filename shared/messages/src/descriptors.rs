@@ -1,7 +1,7 @@
 use lidar::MAX_RETURNS;
 use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, KnownLayout};
 
-use crate::{Bounded, ClusterSummary, MAX_CLUSTERS, Message, SweepHeader};
+use crate::{Bounded, ClusterSummary, Fit, MAX_CLUSTERS, MAX_FITS, Message, SweepHeader};
 
 /// Fewest points of a cluster from which features are extracted (paper, Sec. III-B.3).
 pub const MIN_FEATURE_POINTS: usize = 5;
@@ -27,14 +27,23 @@ pub struct Descriptor {
     pub summary: ClusterSummary,
     /// Place of its first bin in `bins`.
     pub first_bin: u32,
-    /// Number of its bins, in order of index; 0 where no features were extracted.
+    /// Number of its bins, in order of index; 0 where no histogram was made.
     pub bins: u32,
+    /// Place of its fit in `fits`.
+    pub first_fit: u32,
+    /// 1 where solids were fitted, else 0.
+    pub fits: u32,
 }
 
 impl Descriptor {
     /// Places of its bins in the message's `bins`.
     pub fn bin_places(&self) -> std::ops::Range<usize> {
         self.first_bin as usize..(self.first_bin + self.bins) as usize
+    }
+
+    /// Place of its fit in the message's `fits`, if it has one.
+    pub fn fit_place(&self) -> Option<usize> {
+        (self.fits > 0).then_some(self.first_fit as usize)
     }
 }
 
@@ -50,15 +59,31 @@ pub struct Descriptors {
     pub members: Bounded<u32, MAX_RETURNS>,
     /// Bins: descriptor after descriptor.
     pub bins: Bounded<Bin, MAX_BINS>,
+    /// Fitted solids, in the order of their descriptors.
+    pub fits: Bounded<Fit, MAX_FITS>,
 }
 
 impl Message for Descriptors {
-    const TYPE: &'static str = "encke.Descriptors.1";
+    const TYPE: &'static str = "encke.Descriptors.2";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();
         self.descriptors.clear();
         self.members.clear();
         self.bins.clear();
+        self.fits.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_and_fit_have_places_only_where_there_are_some() {
+        let none = Descriptor { first_bin: 5, first_fit: 7, ..Descriptor::default() };
+        assert_eq!((none.bin_places(), none.fit_place()), (5..5, None));
+        let both = Descriptor { bins: 2, fits: 1, ..none };
+        assert_eq!((both.bin_places(), both.fit_place()), (5..7, Some(7)));
     }
 }

@@ -43,12 +43,20 @@ pub enum Verdict {
     RejectedMalformed = 3,
     /// The sink could not take it: its writer was behind at real time.
     RejectedSinkFull = 4,
+    /// No solids were fitted to the last clusters: the message was full.
+    PartialFits = 5,
 }
 
 impl Verdict {
     /// All verdicts, by their number.
-    pub const ALL: [Self; 5] =
-        [Self::Complete, Self::PartialCells, Self::RejectedIncomplete, Self::RejectedMalformed, Self::RejectedSinkFull];
+    pub const ALL: [Self; 6] = [
+        Self::Complete,
+        Self::PartialCells,
+        Self::RejectedIncomplete,
+        Self::RejectedMalformed,
+        Self::RejectedSinkFull,
+        Self::PartialFits,
+    ];
 
     /// Whether the part counts as rejected in the ledger.
     pub const fn is_rejected(self) -> bool {
@@ -60,6 +68,7 @@ impl Verdict {
         match self {
             Self::Complete => "complete",
             Self::PartialCells => "partial_cells",
+            Self::PartialFits => "partial_fits",
             Self::RejectedIncomplete => "incomplete",
             Self::RejectedMalformed => "malformed",
             Self::RejectedSinkFull => "sink_full",
