@@ -4,12 +4,12 @@
 
 mod common;
 
-use common::{scattered, slow_histogram, sphere};
+use common::{histogram_params, scattered, slow_histogram, sphere};
 use extractor::{Features, Params};
 use lidar::Return;
 
 fn features(neighbours: u32) -> Features {
-    Features::new(&Params { neighbours, spacing_deg: 0.72 }.checked().unwrap())
+    Features::new(&Params { neighbours, ..histogram_params() }.checked().unwrap())
 }
 
 fn dense(features: &mut Features, returns: &[Return], stride: usize) -> Vec<f64> {

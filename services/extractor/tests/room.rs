@@ -4,15 +4,15 @@
 
 mod common;
 
-use common::{message, scattered, sphere};
-use extractor::{Extractor, Params};
+use common::{histogram_params, message, scattered, sphere};
+use extractor::Extractor;
 use lidar::Return;
 use messages::{Clusters, Descriptors, Message, Part, Verdict};
 use stage::Stage;
 use zerocopy::FromZeros;
 
 fn room() -> Extractor {
-    Extractor::init(Params { neighbours: 5, spacing_deg: 0.72 }).unwrap()
+    Extractor::init(histogram_params()).unwrap()
 }
 
 fn process(room: &mut Extractor, input: &Clusters) -> (Verdict, Box<Descriptors>) {

@@ -2,11 +2,23 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use extractor::Params;
 use lidar::Return;
-use messages::{Cluster, ClusterSummary, Clusters, SweepHeader};
+use messages::{Cell, Cluster, ClusterSummary, Clusters, SweepHeader};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use zerocopy::FromZeros;
+
+/// The shipped parameters, with both descriptions on.
+pub(crate) fn params() -> Params {
+    let file = include_str!("../../../../config/stages/extractor.toml");
+    Params { histogram: true, solids: true, ..toml::from_str(file).unwrap() }
+}
+
+/// The shipped parameters of the histogram, and no solids.
+pub(crate) fn histogram_params() -> Params {
+    Params { solids: false, ..params() }
+}
 
 /// Points spread at random in a box of 2 m at 10 m, on a coarse lattice where `step_m` is given, so that many
 /// distances are equal and many points coincide.
@@ -57,6 +69,15 @@ pub(crate) fn message(clusters: &[Vec<Return>], column_step_rad: f32) -> Box<Clu
         }
     }
     message
+}
+
+/// Gives the last cluster of a message these cells.
+pub(crate) fn add_cells(message: &mut Clusters, cells: &[Cell]) {
+    let first_cell = message.cells.len() as u32;
+    let last = message.clusters.len() - 1;
+    message.cells.extend_from_slice(cells).unwrap();
+    let cluster = &mut message.clusters[last];
+    (cluster.first_cell, cluster.cells) = (first_cell, cells.len() as u32);
 }
 
 /// The neighbours of each point by brute force: all others, sorted by squared distance in `f32`, then by index.
