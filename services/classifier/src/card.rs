@@ -21,8 +21,12 @@ pub struct Card {
     pub file: String,
     /// Checksum of the model file, 64 hexadecimal digits.
     pub sha256: String,
-    /// The features that the model expects.
-    pub features: FeatureDefinition,
+    /// The histogram that the model expects; for Naive Bayes and the support vector machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub features: Option<FeatureDefinition>,
+    /// The fit that the model expects; for boosted trees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solids: Option<SolidsDefinition>,
     /// What it was trained on: distribution, sensor, examples, seed. For people.
     pub data: toml::Table,
     /// What training chose. For people.
@@ -43,6 +47,20 @@ pub struct FeatureDefinition {
     pub neighbours: u32,
     /// `spacing_deg` of the extractor that made the training data.
     pub spacing_deg: f64,
+}
+
+/// How the solids were fitted that a model was trained on, and which fits it judges.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidsDefinition {
+    /// `fit.evaluations` of the extractor.
+    pub evaluations: u64,
+    /// `fit.scouting_rays` of the extractor.
+    pub scouting_rays: usize,
+    /// `fit.rays` of the extractor.
+    pub rays: usize,
+    /// A cluster whose best solid is off by more ([`misfit`](crate::misfit)) is none of the four.
+    pub most_misfit: f32,
 }
 
 /// Why a model is refused by its card.
@@ -66,6 +84,17 @@ pub enum CardError {
     /// The file is named by a path.
     #[error("file is {0:?}, must be a plain name in the card's folder")]
     File(String),
+    /// What the kind of model expects is not said.
+    #[error("[{table}] is missing, must be given for {kind}", kind = .kind.name())]
+    Missing {
+        /// The table.
+        table: &'static str,
+        /// The kind of model.
+        kind: Method,
+    },
+    /// No fit passes, or every one.
+    #[error("solids.most_misfit is {0}, must be positive and finite")]
+    Misfit(f32),
     /// Trained on other features.
     #[error("features.bins is {0}, must be {BINS}")]
     Bins(u32),
@@ -100,13 +129,25 @@ impl Card {
         if card.file.is_empty() || card.file.contains(['/', '\\']) || card.file.starts_with('.') {
             return Err(CardError::File(card.file));
         }
-        if card.features.bins as usize != BINS {
-            return Err(CardError::Bins(card.features.bins));
-        }
-        if card.features.normalisation != NORMALISATION {
-            return Err(CardError::Normalisation(card.features.normalisation));
-        }
+        card.check_features()?;
         Ok(card)
+    }
+
+    fn check_features(&self) -> Result<(), CardError> {
+        let missing = |table| CardError::Missing { table, kind: self.kind };
+        if self.kind == Method::BoostedTrees {
+            let most_misfit = self.solids.as_ref().ok_or(missing("solids"))?.most_misfit;
+            let holds = most_misfit > 0.0 && most_misfit.is_finite();
+            return if holds { Ok(()) } else { Err(CardError::Misfit(most_misfit)) };
+        }
+        let features = self.features.as_ref().ok_or(missing("features"))?;
+        if features.bins as usize != BINS {
+            return Err(CardError::Bins(features.bins));
+        }
+        if features.normalisation != NORMALISATION {
+            return Err(CardError::Normalisation(features.normalisation.clone()));
+        }
+        Ok(())
     }
 
     /// Checks that the card is of the kind asked for and describes these bytes.

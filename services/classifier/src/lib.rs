@@ -1,4 +1,5 @@
-//! What an obstacle is: the paper's Naive Bayes (Eqs. 5 to 7) and its support vector machine (Sec. V-2), choosable.
+//! What an obstacle is: boosted trees on fitted solids, or the paper's Naive Bayes (Eqs. 5 to 7) and support vector machine
+//! (Sec. V-2), choosable.
 //!
 //! `Descriptors` in, [`Detections`](messages::Detections) out. A model is a file with a [`Card`] beside it that says what it
 //! is, what features it expects and its checksum; a model that does not fit is refused at start.
@@ -25,6 +26,7 @@ mod naive_bayes;
 mod naive_bayes_file;
 mod params;
 mod room;
+mod solid_features;
 mod svm;
 mod svm_file;
 
@@ -33,13 +35,14 @@ pub use boosted_trees::{
     TreeNode, softmax,
 };
 pub use boosted_trees_file::BoostedTreesFileError;
-pub use card::{Card, CardError, FORMAT, FeatureDefinition, NORMALISATION};
+pub use card::{Card, CardError, FORMAT, FeatureDefinition, NORMALISATION, SolidsDefinition};
 pub use coupling::{couple, pairwise_probability};
-pub use model::{Judgement, Model, ModelError, SolidSvm};
+pub use model::{Judgement, Model, ModelError, SolidSvm, SolidTrees};
 pub use naive_bayes::{NaiveBayes, NaiveBayesError};
 pub use naive_bayes_file::NaiveBayesFileError;
 pub use params::{Method, ModelFiles, Params};
 pub use room::{Classifier, ClassifierError};
+pub use solid_features::{SOLID_FEATURES, misfit, solid_feature_names, solid_features};
 pub use svm::{Decision, MAX_CLASSES, PAIRS, Svm};
 pub use svm_file::{SvmFile, SvmFileError};
 

@@ -3,8 +3,8 @@ use messages::{Bin, Descriptors, MAX_CLUSTERS};
 
 use crate::svm::Sums;
 use crate::{
-    Card, CardError, Decision, MAX_CLASSES, Method, ModelFiles, NaiveBayes, NaiveBayesFileError, Svm, SvmFile,
-    SvmFileError,
+    BoostedTrees, BoostedTreesFileError, Card, CardError, Decision, MAX_CLASSES, Method, ModelFiles, NaiveBayes,
+    NaiveBayesFileError, Svm, SvmFile, SvmFileError, misfit, solid_feature_names, solid_features,
 };
 
 /// A model ready to judge.
@@ -14,6 +14,15 @@ pub enum Model {
     NaiveBayes(NaiveBayes),
     /// Support vector machine.
     Svm(SolidSvm),
+    /// Boosted trees.
+    BoostedTrees(SolidTrees),
+}
+
+/// Boosted trees that judge fitted solids.
+#[derive(Clone, Debug)]
+pub struct SolidTrees {
+    trees: BoostedTrees,
+    most_misfit: f32,
 }
 
 /// A support vector machine whose labels are the four solids.
@@ -31,7 +40,7 @@ pub struct SolidSvm {
 pub struct Judgement {
     /// The verdict.
     pub class: ObstacleClass,
-    /// Probability of each of [`ObstacleClass::SOLIDS`]; sums to 1.
+    /// Probability of each of [`ObstacleClass::SOLIDS`]; sums to 1, or all 0 for `Unclassified`.
     pub posterior: [f32; 4],
 }
 
@@ -61,6 +70,21 @@ pub enum ModelError {
         /// Its labels.
         found: Vec<i32>,
     },
+    /// The file holds no boosted trees.
+    #[error("{0}: {1}")]
+    BoostedTrees(String, BoostedTreesFileError),
+    /// Trained on other features than this build makes.
+    #[error("{file}: feature {place} is {found:?}, must be {expected:?}")]
+    Features {
+        /// The model file.
+        file: String,
+        /// From 1.
+        place: usize,
+        /// Its name in the file; empty where the file has fewer.
+        found: String,
+        /// Its name in this build; empty where it has fewer.
+        expected: String,
+    },
     /// The model cannot give a posterior.
     #[error("{0} has no probA and probB, must be trained with probabilities")]
     NoProbabilities(String),
@@ -74,7 +98,7 @@ impl Model {
     pub fn load(method: Method, files: &ModelFiles) -> Result<Self, ModelError> {
         let card = Card::parse(&files.card)?;
         card.vouch(method, &files.model)?;
-        let file = card.file;
+        let (file, solids) = (card.file, card.solids);
         let Ok(text) = std::str::from_utf8(&files.model) else {
             return Err(ModelError::NotText(file));
         };
@@ -87,6 +111,13 @@ impl Model {
                 Ok(read) => Self::from_svm(file, Svm::new(&read)),
                 Err(error) => Err(ModelError::Svm(file, error)),
             },
+            Method::BoostedTrees => {
+                let trees = BoostedTrees::parse(text).map_err(|error| ModelError::BoostedTrees(file.clone(), error))?;
+                fits_features(file, trees.feature_names())?;
+                // A card of this kind has the table.
+                let most_misfit = solids.map_or(f32::INFINITY, |solids| solids.most_misfit);
+                Ok(Self::BoostedTrees(SolidTrees { trees, most_misfit }))
+            }
         }
     }
 
@@ -112,7 +143,8 @@ impl Model {
         Ok(Self::Svm(SolidSvm { svm, solids, sums: vec![Sums::default(); MAX_CLUSTERS] }))
     }
 
-    /// Judges a descriptor: at least one bin, indices under 1728 in rising order.
+    /// Judges a histogram: at least one bin, indices under 1728 in rising order. Boosted trees say `Unclassified`: they
+    /// judge solids.
     ///
     /// Naive Bayes takes the most likely class, the SVM the one with the most votes; equals go to the first in the
     /// paper's order (for the SVM: in the order of the file's labels).
@@ -120,10 +152,19 @@ impl Model {
         match self {
             Self::NaiveBayes(model) => from_naive_bayes(model, bins),
             Self::Svm(model) => model.judgement(&model.svm.decide(bins)),
+            Self::BoostedTrees(_) => Judgement::NONE,
         }
     }
 
-    /// Judges every descriptor of a sweep that has bins, giving `each` its place and what [`Model::judge`] would say.
+    /// Judges a fitted cluster by its features and its misfit; `Unclassified` from models that judge histograms.
+    pub fn judge_solid(&self, features: &[f32], misfit: f32) -> Judgement {
+        match self {
+            Self::BoostedTrees(model) => model.judge(features, misfit),
+            Self::NaiveBayes(_) | Self::Svm(_) => Judgement::NONE,
+        }
+    }
+
+    /// Judges every descriptor of a sweep that has what the model judges, giving `each` its place and the judgement.
     pub(crate) fn judge_all(&mut self, input: &Descriptors, mut each: impl FnMut(usize, Judgement)) {
         let described = || {
             input
@@ -150,8 +191,48 @@ impl Model {
                     each(place, model.judgement(&model.svm.decision(&model.sums[place])));
                 }
             }
+            Self::BoostedTrees(model) => {
+                for (place, descriptor) in input.descriptors.iter().enumerate() {
+                    let Some(fit) = descriptor.fit_place().map(|fit| &input.fits[fit]) else { continue };
+                    let features = solid_features(&input.header, &descriptor.summary, fit);
+                    each(place, model.judge(&features, misfit(fit)));
+                }
+            }
         }
     }
+}
+
+impl Judgement {
+    /// None of the four.
+    pub const NONE: Self = Self { class: ObstacleClass::Unclassified, posterior: [0.0; 4] };
+
+    /// The most likely class; among equals the first in the paper's order.
+    fn most_likely(posterior: [f64; 4]) -> Self {
+        let most = (1..4).fold(0, |most, q| if posterior[q] > posterior[most] { q } else { most });
+        Self { class: ObstacleClass::SOLIDS[most], posterior: posterior.map(|p| p as f32) }
+    }
+}
+
+impl SolidTrees {
+    /// None of the four where the best solid does not explain the rays.
+    fn judge(&self, features: &[f32], misfit: f32) -> Judgement {
+        if misfit > self.most_misfit {
+            return Judgement::NONE;
+        }
+        Judgement::most_likely(self.trees.posterior(features))
+    }
+}
+
+/// Whether a model was trained on the features that this build makes.
+fn fits_features(file: String, found: &[String]) -> Result<(), ModelError> {
+    let expected = solid_feature_names();
+    for place in 0..expected.len().max(found.len()) {
+        if expected.get(place) != found.get(place) {
+            let name = |names: &[String]| names.get(place).cloned().unwrap_or_default();
+            return Err(ModelError::Features { file, place: place + 1, found: name(found), expected: name(&expected) });
+        }
+    }
+    Ok(())
 }
 
 impl SolidSvm {
@@ -165,7 +246,5 @@ impl SolidSvm {
 }
 
 fn from_naive_bayes(model: &NaiveBayes, bins: &[Bin]) -> Judgement {
-    let posterior = model.posterior(bins);
-    let most = (1..4).fold(0, |most, q| if posterior[q] > posterior[most] { q } else { most });
-    Judgement { class: ObstacleClass::SOLIDS[most], posterior: posterior.map(|p| p as f32) }
+    Judgement::most_likely(model.posterior(bins))
 }

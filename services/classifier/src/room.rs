@@ -1,12 +1,13 @@
 use messages::{Descriptors, Detection, Detections, Part, Verdict};
 use stage::{InitError, Stage};
 
-use crate::{BINS, Model, ModelError, Params};
+use crate::{BINS, Judgement, Model, ModelError, Params};
 
 /// The stage: descriptors in, detections out.
 #[derive(Clone, Debug)]
 pub struct Classifier {
     model: Model,
+    least_posterior: f32,
 }
 
 /// Why the classifier cannot start.
@@ -16,6 +17,9 @@ pub enum ClassifierError {
     /// The shell gave no model.
     #[error("files of model {0:?} were not given")]
     NoFiles(String),
+    /// No posterior is as likely, or none less.
+    #[error("least_posterior is {0}, must be 0 to 1")]
+    LeastPosterior(f32),
     /// The model does not hold.
     #[error("model {name:?}: {cause}")]
     Model {
@@ -38,8 +42,12 @@ impl Stage for Classifier {
         let Some(files) = params.files else {
             return Err(InitError::new(ClassifierError::NoFiles(name)));
         };
+        let least_posterior = params.least_posterior;
+        if !(0.0..=1.0).contains(&least_posterior) {
+            return Err(InitError::new(ClassifierError::LeastPosterior(least_posterior)));
+        }
         match Model::load(params.method, &files) {
-            Ok(model) => Ok(Self { model }),
+            Ok(model) => Ok(Self { model, least_posterior }),
             Err(cause) => Err(InitError::new(ClassifierError::Model { name, cause })),
         }
     }
@@ -54,27 +62,47 @@ impl Stage for Classifier {
             let _ = output.detections.push(Detection { summary: descriptor.summary, ..Detection::default() });
         }
         let detections = &mut output.detections;
+        let least = self.least_posterior;
         self.model.judge_all(input, |place, judgement| {
+            let claimed = judgement.class.solid_index().is_some_and(|class| judgement.posterior[class] >= least);
+            let judgement = if claimed { judgement } else { Judgement::NONE };
             detections[place].class = judgement.class;
             detections[place].posterior = judgement.posterior;
         });
+        for (descriptor, detection) in input.descriptors.iter().zip(output.detections.iter_mut()) {
+            detection.first_solid = output.solids.len() as u32;
+            let Some((fit, solid)) = descriptor.fit_place().zip(detection.class.solid_index()) else { continue };
+            // Cannot overflow: both messages hold as many.
+            if output.solids.push(input.fits[fit].solids[solid].solid).is_ok() {
+                detection.solids = 1;
+            }
+        }
         Verdict::Complete
     }
 }
 
-/// Whether the descriptors part members and bins among them, in order, and every bin is one.
+/// Whether the descriptors part members, bins and fits among them, in order, and every bin and fit is one.
 fn is_well_formed(input: &Descriptors) -> bool {
     let mut next_member: u64 = 0;
     let mut next_bin: u64 = 0;
+    let mut next_fit: u64 = 0;
     for descriptor in &input.descriptors {
         let summary = descriptor.summary;
         if u64::from(summary.first_member) != next_member || u64::from(descriptor.first_bin) != next_bin {
             return false;
         }
+        if u64::from(descriptor.first_fit) != next_fit || descriptor.fits > 1 {
+            return false;
+        }
+        next_fit += u64::from(descriptor.fits);
         next_member += u64::from(summary.points);
         next_bin += u64::from(descriptor.bins);
     }
-    if next_member != input.members.len() as u64 || next_bin != input.bins.len() as u64 {
+    if next_member != input.members.len() as u64
+        || next_bin != input.bins.len() as u64
+        || next_fit != input.fits.len() as u64
+        || !input.fits.iter().flat_map(|fit| &fit.solids).all(|solid| solid.cost().is_finite())
+    {
         return false;
     }
     input.descriptors.iter().all(|descriptor| {

@@ -3,7 +3,7 @@
 mod common;
 
 use classifier::{Classifier, Method, ModelFiles, Params};
-use common::{naive_bayes_params, svm_params, text_of, trained};
+use common::{naive_bayes_params, svm_params, text_of, trained, trees_params, trees_text};
 use stage::Stage;
 
 fn refusal(params: Params) -> String {
@@ -56,7 +56,7 @@ fn a_model_file_of_another_checksum_is_refused() {
 fn a_model_file_that_is_none_is_refused() {
     assert!(refusal(svm_params("nonsense")).contains("model.libsvm: line 1: nonsense is"));
     let files = ModelFiles { card: common::card_text("svm", "model.libsvm", &[0xff]), model: vec![0xff] };
-    let params = Params { method: Method::Svm, model: "test".to_owned(), files: Some(files) };
+    let params = Params { method: Method::Svm, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) };
     assert!(refusal(params).contains("model.libsvm is not UTF-8 text"));
 }
 
@@ -71,6 +71,31 @@ fn an_svm_without_probabilities_or_with_other_labels_is_refused() {
         assert!(refusal.contains("must name each of 1 to 4 once"), "{refusal}");
     }
     assert!(refusal(svm_params(&text_of(&trained(3, 60, 1.0, true)))).contains("label is [1, 2, 3]"));
+}
+
+// verifies CLA-005
+#[test]
+fn trees_without_their_definition_or_on_other_features_are_refused() {
+    assert!(Classifier::init(trees_params(&trees_text())).is_ok());
+    let spoilt = |from: &str, to: &str| {
+        let mut params = trees_params(&trees_text());
+        if let Some(files) = &mut params.files {
+            assert!(files.card.contains(from), "{from}");
+            files.card = files.card.replace(from, to);
+        }
+        refusal(params)
+    };
+    assert_eq!(
+        spoilt("most_misfit = 5.0", "most_misfit = 0.0"),
+        "model \"test\": solids.most_misfit is 0, must be positive and finite"
+    );
+    assert!(spoilt("most_misfit = 5.0", "").contains("missing field `most_misfit`"));
+    let kind = spoilt("boosted-trees", "svm");
+    assert_eq!(kind, "model \"test\": [features] is missing, must be given for svm");
+    let renamed = trees_text().replacen("box_excess", "box_surplus", 1);
+    let refused = refusal(trees_params(&renamed));
+    assert_eq!(refused, "model \"test\": model.txt: feature 1 is \"box_surplus\", must be \"box_excess\"");
+    assert!(refusal(trees_params("encke boosted-trees 9\n")).contains("model.txt: line 1 is"));
 }
 
 #[test]

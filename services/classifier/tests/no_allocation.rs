@@ -7,7 +7,10 @@ mod common;
 use std::alloc::System;
 
 use classifier::Classifier;
-use common::{histograms, message, naive_bayes_params, svm_params, text_of, trained};
+use common::{
+    fit, fitted_message, histograms, message, naive_bayes_params, svm_params, text_of, trained, trees_params,
+    trees_text,
+};
 use messages::{Detections, Message, Part};
 use stage::Stage;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -20,14 +23,19 @@ static GLOBAL: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 #[test]
 fn processing_allocates_nothing() {
     let entries: Vec<_> = histograms(50, 4).into_iter().map(|(_, bins)| (8, bins)).collect();
-    let input = message(&entries);
-    for params in [naive_bayes_params(), svm_params(&text_of(&trained(4, 200, 1.0, true)))] {
+    let histograms = message(&entries);
+    let fits: Vec<_> = (0..50).map(|place| (8, Some(fit(place % 4, 1.0)))).collect();
+    let fits = fitted_message(&fits);
+    let svm = svm_params(&text_of(&trained(4, 200, 1.0, true)));
+    for (params, input) in
+        [(naive_bayes_params(), &histograms), (svm, &histograms), (trees_params(&trees_text()), &fits)]
+    {
         let mut sut = Classifier::init(params).unwrap();
         let mut output = Detections::new_box_zeroed().unwrap();
         let region = Region::new(GLOBAL);
         for _ in 0..3 {
             output.clear();
-            sut.process(Part::default(), &input, &mut output);
+            sut.process(Part::default(), input, &mut output);
         }
         let change = region.change();
         assert_eq!(output.detections.len(), 50);

@@ -2,9 +2,9 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use classifier::{BINS, Card, Method, ModelFiles, NaiveBayes, Params};
+use classifier::{BINS, BoostedTrees, Card, Method, ModelFiles, NaiveBayes, Params, TreeNode, solid_feature_names};
 use libsvm_rs::{KernelType, SvmModel, SvmNode, SvmParameterBuilder, SvmProblem, SvmType};
-use messages::{Bin, ClusterSummary, Descriptor, Descriptors};
+use messages::{Bin, ClusterSummary, Descriptor, Descriptors, Fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use zerocopy::FromZeros;
@@ -72,13 +72,13 @@ pub(crate) fn card_text(kind: &str, file: &str, model: &[u8]) -> String {
 
 pub(crate) fn svm_params(text: &str) -> Params {
     let files = ModelFiles { card: card_text("svm", "model.libsvm", text.as_bytes()), model: text.into() };
-    Params { method: Method::Svm, model: "test".to_owned(), files: Some(files) }
+    Params { method: Method::Svm, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
 }
 
 pub(crate) fn naive_bayes_params() -> Params {
     let text = naive_bayes_text();
     let files = ModelFiles { card: card_text("naive-bayes", "model.txt", text.as_bytes()), model: text.into() };
-    Params { method: Method::NaiveBayes, model: "test".to_owned(), files: Some(files) }
+    Params { method: Method::NaiveBayes, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
 }
 
 /// A message with a descriptor of `points` members and the given bins for each entry.
@@ -89,10 +89,61 @@ pub(crate) fn message(entries: &[(u32, Vec<Bin>)]) -> Box<Descriptors> {
         let first_member = message.members.len() as u32;
         let summary = ClusterSummary { key: first_member, first_member, points: *points, ..ClusterSummary::default() };
         let first_bin = message.bins.len() as u32;
-        message.descriptors.push(Descriptor { summary, first_bin, bins: bins.len() as u32 }).unwrap();
+        let bins_only = Descriptor { summary, first_bin, bins: bins.len() as u32, ..Descriptor::default() };
+        message.descriptors.push(bins_only).unwrap();
         message.bins.extend_from_slice(bins).unwrap();
         for member in first_member..first_member + points {
             message.members.push(member).unwrap();
+        }
+    }
+    message
+}
+
+/// Trees that say: the solid whose excess of cost is under 1 is e³ times as likely as each other.
+pub(crate) fn trees_text() -> String {
+    let names = solid_feature_names();
+    let excess = |solid: &str| names.iter().position(|name| *name == format!("{solid}_excess")).unwrap() as u8;
+    let trees = ["box", "ellipsoid", "cylinder", "cone"].map(|solid| {
+        vec![TreeNode::Split { feature: excess(solid), threshold: 1.0 }, TreeNode::Leaf(3.0), TreeNode::Leaf(0.0)]
+    });
+    BoostedTrees::new(names.clone(), [0.0; 4], 1.0, &trees).unwrap().to_text()
+}
+
+pub(crate) fn trees_card(model: &[u8]) -> String {
+    format!(
+        "format = 1\nkind = \"boosted-trees\"\nfile = \"model.txt\"\nsha256 = \"{}\"\n\n[solids]\nevaluations = 30000\n\
+         scouting_rays = 36\nrays = 96\nmost_misfit = 5.0\n\n[data]\n[parameters]\n[scores]\n",
+        Card::checksum(model)
+    )
+}
+
+pub(crate) fn trees_params(text: &str) -> Params {
+    let files = ModelFiles { card: trees_card(text.as_bytes()), model: text.into() };
+    Params { method: Method::BoostedTrees, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
+}
+
+/// A fit to 10 hits of which one solid explains each to `residual` standard deviations, and the others to twice that and
+/// more.
+pub(crate) fn fit(solid: usize, residual: f32) -> Fit {
+    let mut fit = Fit { hits: 10, ..Fit::default() };
+    for (place, of) in fit.solids.iter_mut().enumerate() {
+        let times = if place == solid { 1.0 } else { 4.0 + place as f32 };
+        of.hit_cost = 10.0 * residual * residual * times;
+        of.solid.centre_m = [5.0, place as f32, 0.0];
+        of.solid.size_m = [1.0, 1.0, 2.0];
+    }
+    fit
+}
+
+/// A message with a descriptor of `points` members and a fit, if any, for each entry.
+pub(crate) fn fitted_message(entries: &[(u32, Option<Fit>)]) -> Box<Descriptors> {
+    let bare: Vec<(u32, Vec<Bin>)> = entries.iter().map(|(points, _)| (*points, Vec::new())).collect();
+    let mut message = message(&bare);
+    for (place, (_, fit)) in entries.iter().enumerate() {
+        message.descriptors[place].first_fit = message.fits.len() as u32;
+        if let Some(fit) = fit {
+            message.descriptors[place].fits = 1;
+            message.fits.push(*fit).unwrap();
         }
     }
     message
