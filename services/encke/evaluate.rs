@@ -1,35 +1,20 @@
+//! `encke evaluate`: the configured classifier against its bars, or the paper's experiments.
+
+mod bars;
+mod paper;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use ground::RunNote;
 
-use crate::assets::Assets;
+use crate::Failure;
 use crate::cli::EvaluateArgs;
-use crate::{Failure, train};
 
-/// Repeats the paper's experiments and writes `paper.json` and `paper.html`.
+/// Measures, prints, and writes a page.
 pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
-    let assets = Assets::beside(None);
-    let plan = train::plan(&args.plan, &assets)?;
-    let named = |cause: &dyn std::fmt::Display| Failure::start(format!("{}: {cause}", args.plan.display()));
-    plan.check().and_then(|()| plan.reproduction().map(drop)).map_err(|cause| named(&cause))?;
-    let out = Out::open(&args.out)?;
-
-    let started_ns = runtime::clock::now_ns();
-    let read = |path: &str| assets.text(path).map_err(std::io::Error::other);
-    let reproduction = ground::reproduce(&plan, &read, &|progress| eprintln!("{progress}")).map_err(Failure::start)?;
-    let run = RunNote {
-        plan_file: args.plan.display().to_string(),
-        machine: processor(),
-        cores: std::thread::available_parallelism().map_or(1, usize::from),
-        duration_s: ((runtime::clock::now_ns() - started_ns) as f64 * 1e-8).round() / 10.0,
-    };
-    let json = reproduction.to_json(&run);
-    out.write("paper.json", &json)?;
-    out.write("paper.html", &reproduction.to_html(&run))?;
-    eprintln!("{:.0} s; the page is {}", run.duration_s, out.0.join("paper.html").display());
-    crate::print(&if args.json { json } else { format!("{reproduction}\n") })
+    if args.paper { paper::evaluate(args) } else { bars::evaluate(args) }
 }
 
 /// A folder that can be written to: known before minutes of work.
@@ -50,6 +35,16 @@ impl Out {
         fs::write(&part, text)
             .and_then(|()| fs::rename(&part, &whole))
             .map_err(|cause| Failure::run(format!("{}: {cause}", whole.display())))
+    }
+}
+
+/// What differs from run to run, once all is done.
+fn run_note(plan: &Path, started_ns: u64) -> RunNote {
+    RunNote {
+        plan_file: plan.display().to_string(),
+        machine: processor(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        duration_s: ((runtime::clock::now_ns() - started_ns) as f64 * 1e-8).round() / 10.0,
     }
 }
 

@@ -14,25 +14,35 @@
 //! # }
 //! ```
 
+mod bars;
 mod calibrate;
 mod confusion;
+mod few;
 mod fit_naive_bayes;
 mod fit_svm;
 mod fit_trees;
 mod observe;
+mod owner;
 mod paper;
 mod parallel;
 mod plan;
 mod report;
 mod sets;
+mod solids;
 mod svm_text;
 mod train;
 
+pub use bars::{
+    Bar, BudgetPlan, BudgetPoint, Claims, Clock, EvaluateError, Evaluation, EvaluationNote, EvaluationPlan,
+    EvaluationPlanError, FitPlan, FitTime, Judge, Judges, Measure, Sense, Share, SolidErrors, Standing, Summed,
+    SweepsPlan, Tally, Threshold, VariantsPlan,
+};
 pub use calibrate::{RELIABILITY_BINS, Reliability, ReliabilityBin, best_temperature, log_loss};
 pub use confusion::Confusion;
 pub use fit_trees::{BoostingParams, FitTreesError, FittedTrees, LabelledRows, RoundLoss, fit_trees};
-pub use observe::{Example, ObserveError, Observer, Seen, View};
+pub use observe::{Described, Example, ObserveError, Observer, Seen, View};
 pub use paper::{Choice, Converged, Files, FourClass, Reproduction, RunNote, TwoClass, reproduce};
 pub use plan::{NaiveBayesPlan, PlanError, ReproductionPlan, SvmPlan, TrainPlan};
 pub use report::{ModelReport, TrainReport};
+pub use solids::{SetPlan, SolidsPlan, SolidsPlanError, SolidsReport, TrainSolidsError, TrainedSolids, train_solids};
 pub use train::{Progress, TrainError, Trained, train};

@@ -9,8 +9,13 @@ use rand_chacha::ChaCha8Rng;
 use simulator::{Scene, SceneFile, Shape, Simulator};
 use stage::Stage;
 
+use crate::few::leave_out_larger;
+
 /// Obstacles drawn for one example before the distribution counts as one that cannot be seen.
 const ATTEMPTS: u32 = 10_000;
+
+/// Every sweep is whole.
+const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0 };
 
 /// One obstacle as the chain describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,12 +47,37 @@ pub struct View {
     pub neighbours: Option<u32>,
     /// The extractor's `spacing_deg`.
     pub spacing_deg: Option<f64>,
+    /// Share of echoes that are lost.
+    pub dropout: Option<f64>,
+    /// What the extractor makes of a cluster.
+    pub described: Described,
+    /// The extractor's `fit.evaluations`.
+    pub evaluations: Option<u64>,
+    /// Larger clusters are left out.
+    pub most_points: Option<u32>,
+}
+
+/// What an extractor makes of a cluster.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Described {
+    /// What its file of parameters says.
+    #[default]
+    AsConfigured,
+    /// The paper's histogram alone.
+    Histogram,
+    /// Fitted solids alone.
+    Solids,
 }
 
 impl View {
     /// A scene as its file has it.
     pub fn of(scene: &str) -> Self {
         Self { scene: scene.to_owned(), ..Self::default() }
+    }
+
+    /// The same, described by the paper's histogram.
+    pub fn by_histogram(scene: &str) -> Self {
+        Self { described: Described::Histogram, ..Self::of(scene) }
     }
 }
 
@@ -58,6 +88,7 @@ pub struct Observer {
     alone: Simulator,
     clusterer: Clusterer,
     extractor: Extractor,
+    most_points: Option<u32>,
     sweep: Box<Sweep>,
     truth: Box<Truth>,
     clusters: Box<Clusters>,
@@ -104,6 +135,7 @@ impl Observer {
             sensor.clone_into(&mut scene.sensor);
         }
         scene.range_sigma_m = view.range_sigma_m.or(scene.range_sigma_m);
+        scene.dropout = view.dropout.unwrap_or(scene.dropout);
         for field in &mut scene.field {
             field.proportion = view.proportion.unwrap_or(field.proportion);
             field.count = view.count.unwrap_or(field.count);
@@ -117,6 +149,11 @@ impl Observer {
         let extractor = init::<Extractor>(read, |params| {
             params.neighbours = view.neighbours.unwrap_or(params.neighbours);
             params.spacing_deg = view.spacing_deg.unwrap_or(params.spacing_deg);
+            params.fit.evaluations = view.evaluations.unwrap_or(params.fit.evaluations);
+            if view.described != Described::AsConfigured {
+                params.histogram = view.described == Described::Histogram;
+                params.solids = view.described == Described::Solids;
+            }
         })?;
         Ok(Self {
             scene,
@@ -124,6 +161,7 @@ impl Observer {
             alone,
             clusterer,
             extractor,
+            most_points: view.most_points,
             sweep: zeroed()?,
             truth: zeroed()?,
             clusters: zeroed()?,
@@ -185,11 +223,34 @@ impl Observer {
     /// # Errors
     /// A field that finds no room for its obstacles.
     pub fn mixed(&mut self, seed: u64) -> Result<(), ObserveError> {
-        let scene = SceneFile { seed, ..self.scene.clone() };
+        self.show(Some(seed), 0)
+    }
+
+    /// The same at its n-th sweep, 0 the first; without a seed, with the scene's own.
+    ///
+    /// # Errors
+    /// A field that finds no room for its obstacles.
+    pub fn show(&mut self, seed: Option<u64>, sweep: u64) -> Result<(), ObserveError> {
+        let scene = SceneFile { seed: seed.unwrap_or(self.scene.seed), ..self.scene.clone() };
         let mut simulator = Simulator::new(checked(scene, &self.sensor, "scene")?);
-        simulator.sweep(0, &mut self.sweep, &mut self.truth);
+        simulator.sweep(sweep, &mut self.sweep, &mut self.truth);
         self.describe();
         Ok(())
+    }
+
+    /// Whatever `fill` puts into an empty sweep and its truth, as the chain describes it.
+    pub fn look<R>(&mut self, fill: impl FnOnce(&mut Sweep, &mut Truth) -> R) -> R {
+        self.sweep.clear();
+        self.truth.clear();
+        let filled = fill(&mut self.sweep, &mut self.truth);
+        self.describe();
+        filled
+    }
+
+    /// Describes once more what was clustered last: to time it.
+    pub fn extract(&mut self) {
+        self.descriptors.clear();
+        self.extractor.process(PART, &self.clusters, &mut self.descriptors);
     }
 
     /// The distribution's largest distance of an obstacle's centre from the spin axis [m].
@@ -203,11 +264,12 @@ impl Observer {
     }
 
     fn describe(&mut self) {
-        let part = Part { sectors: 1, ..Part::default() };
         self.clusters.clear();
-        self.descriptors.clear();
-        self.clusterer.process(part, &self.sweep, &mut self.clusters);
-        self.extractor.process(part, &self.clusters, &mut self.descriptors);
+        self.clusterer.process(PART, &self.sweep, &mut self.clusters);
+        if let Some(most_points) = self.most_points {
+            leave_out_larger(&mut self.clusters, most_points);
+        }
+        self.extract();
     }
 
     fn example(&self, descriptor: &Descriptor, class: ObstacleClass) -> Example {

@@ -126,7 +126,7 @@ fn observe(
     read: &dyn Fn(&str) -> std::io::Result<String>,
     say: &mut dyn FnMut(&str),
 ) -> Result<Examples, TrainError> {
-    let view = View::of(&plan.scene);
+    let view = View::by_histogram(&plan.scene);
     let mut observer = Observer::new(&view, read)?;
     let mut dense = Observer::new(&View { sensor: Some(plan.dense_sensor.clone()), ..view }, read)?;
     let mut examples =
@@ -163,7 +163,8 @@ fn test(
         kind: fitted.kind,
         file: fitted.file.to_owned(),
         sha256: Card::checksum(fitted.text.as_bytes()),
-        features: features.clone(),
+        features: Some(features.clone()),
+        solids: None,
         data: table([
             ("simulated", format!("config/scenes/{}.toml, one obstacle at a time", plan.scene).into()),
             ("examples_of_each_class", (plan.examples as i64).into()),

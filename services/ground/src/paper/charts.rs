@@ -9,12 +9,12 @@ use super::pictures::Combinations;
 use super::svg::COLOURS;
 use super::{Converged, published};
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
-const FONT: &str = "sans-serif";
-const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
-const PALE: RGBColor = RGBColor(0xdd, 0xdd, 0xdd);
+pub(crate) const FONT: &str = "sans-serif";
+pub(crate) const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
+pub(crate) const PALE: RGBColor = RGBColor(0xdd, 0xdd, 0xdd);
 
 /// Fig. 3: share of the most frequent combinations in each class; a bar is the mean, a line goes from the first to the
 /// last decile.
@@ -132,7 +132,7 @@ pub(crate) fn convergence(points: &[Converged]) -> String {
     })
 }
 
-fn draw(size: (u32, u32), picture: impl FnOnce(&Area<'_>) -> Drawn) -> String {
+pub(crate) fn draw(size: (u32, u32), picture: impl FnOnce(&Area<'_>) -> Drawn) -> String {
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -144,7 +144,7 @@ fn draw(size: (u32, u32), picture: impl FnOnce(&Area<'_>) -> Drawn) -> String {
     svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, r#" role="img""#, 1)
 }
 
-fn rgb(colour: &str) -> RGBColor {
+pub(crate) fn rgb(colour: &str) -> RGBColor {
     let part = |from: usize| colour.get(from..from + 2).and_then(|hex| u8::from_str_radix(hex, 16).ok()).unwrap_or(0);
     RGBColor(part(1), part(3), part(5))
 }

@@ -90,7 +90,7 @@ fn scaled(example: &Example, scale: f32) -> Vec<messages::Bin> {
 
 /// All questions, the unchanged first.
 pub(crate) fn questions(plan: &TrainPlan, reproduction: &ReproductionPlan) -> Vec<Question> {
-    let as_is = View::of(&plan.scene);
+    let as_is = View::by_histogram(&plan.scene);
     let dense = View { sensor: Some(plan.dense_sensor.clone()), ..as_is.clone() };
     let scale = "how a cluster's histogram is scaled; γ = 3 means nothing without it";
     let eq_7 =
@@ -142,7 +142,7 @@ pub(crate) fn questions(plan: &TrainPlan, reproduction: &ReproductionPlan) -> Ve
             "how far training obstacles are; Fig. 6 shows that tests reach farther",
             "as far as the tests'",
             &format!("nearer: config/scenes/{}.toml", reproduction.near_scene),
-            Otherwise::Training(View::of(&reproduction.near_scene)),
+            Otherwise::Training(View::by_histogram(&reproduction.near_scene)),
         ),
         one(
             "slender",

@@ -1,17 +1,17 @@
 //! The paper's experiments (Sec. VI), one after the other, from one plan.
 
 mod bayes_variants;
-mod charts;
+pub(crate) mod charts;
 mod choices;
 mod json;
 mod measure;
 mod outline;
-mod page;
+pub(crate) mod page;
 mod page_choices;
 mod pictures;
 mod published;
 mod summary;
-mod svg;
+pub(crate) mod svg;
 
 use classifier::NaiveBayes;
 use simulator::Shape;
@@ -212,7 +212,7 @@ impl Job<'_> {
 }
 
 fn observe(plan: &TrainPlan, read: Files<'_>) -> Result<Data, TrainError> {
-    let view = View::of(&plan.scene);
+    let view = View::by_histogram(&plan.scene);
     let of_shapes = parallel::map(&Shape::ALL, |&shape| -> Result<Data, TrainError> {
         let mut observer = Observer::new(&view, &read)?;
         Ok(Data {

@@ -6,7 +6,7 @@ use lidar::ObstacleClass;
 
 use super::{FourClass, Reproduction, RunNote, charts, published, svg};
 
-const STYLE: &str = "\
+pub(crate) const STYLE: &str = "\
 :root{color-scheme:light}body{margin:0;background:#fff;color:#222;font:16px/1.5 Georgia,'Times New Roman',serif}\
 main{max-width:1040px;margin:0 auto;padding:24px 20px 60px}h1{font-size:28px;line-height:1.2;margin:0 0 4px}\
 h2{font-size:20px;margin:40px 0 8px;border-bottom:1px solid #ccc}p{max-width:46em}\
@@ -210,6 +210,6 @@ fn write_cell(page: &mut String, share: f64, paper: f64, digits: usize) -> fmt::
     )
 }
 
-pub(super) fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

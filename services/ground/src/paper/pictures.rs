@@ -74,7 +74,7 @@ impl Pictures {
         training: &[Example],
         read: Files<'_>,
     ) -> Result<Self, ObserveError> {
-        let mut observer = Observer::new(&View::of(&plan.scene), &read)?;
+        let mut observer = Observer::new(&View::by_histogram(&plan.scene), &read)?;
         let seed = Set::Training.seed(plan.seed);
         let scans = Shape::ALL.into_iter().map(|shape| scan(&mut observer, seed, shape)).collect::<Result<_, _>>()?;
         observer.mixed(scene_seed)?;
