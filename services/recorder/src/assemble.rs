@@ -1,9 +1,9 @@
 //! Parts → sweep: collects the sectors of a sweep, orders its clusters by key, and says what is missing.
 //!
 //! Parts come in order of their ordinals. A sweep ends with its last sector, or unfinished when a part of another
-//! sweep follows. Members are indices in the whole sweep; only their places are rebased.
+//! sweep follows. Members are indices in the whole sweep; only their places, and those of solids, are rebased.
 
-use messages::{Detection, Part, Refusal};
+use messages::{Detection, Part, Refusal, Solid};
 
 use crate::part_rows::PartRows;
 
@@ -24,6 +24,8 @@ pub(crate) struct SweepRows {
     /// In order of key: a cluster's place is its dense id.
     pub(crate) detections: Vec<Detection>,
     pub(crate) members: Vec<u32>,
+    /// In the order in which they came: a detection knows its place.
+    pub(crate) solids: Vec<Solid>,
 }
 
 impl SweepRows {
@@ -34,10 +36,11 @@ impl SweepRows {
     }
 
     fn begin(&mut self, part: Part) {
-        let Self { detections, members, .. } = std::mem::take(self);
-        *self = Self { part, detections, members, ..Self::default() };
+        let Self { detections, members, solids, .. } = std::mem::take(self);
+        *self = Self { part, detections, members, solids, ..Self::default() };
         self.detections.clear();
         self.members.clear();
+        self.solids.clear();
     }
 
     fn add(&mut self, rows: &PartRows) {
@@ -47,13 +50,17 @@ impl SweepRows {
             *sum += u64::from(refused);
         }
         self.rejected_sectors += u32::from(rows.rejected);
-        let base = self.members.len() as u32;
+        let (members, solids) = (self.members.len() as u32, self.solids.len() as u32);
         self.detections.extend(rows.detections.iter().map(|detection| {
             let mut detection = *detection;
-            detection.summary.first_member += base;
+            detection.summary.first_member += members;
+            if detection.solid_place().is_some() {
+                detection.first_solid += solids;
+            }
             detection
         }));
         self.members.extend_from_slice(&rows.members);
+        self.solids.extend_from_slice(&rows.solids);
     }
 }
 
@@ -101,11 +108,19 @@ mod tests {
 
     use super::*;
 
+    /// Every third cluster has none.
+    fn has_solid(key: u32) -> bool {
+        key % 3 != 1
+    }
+
     fn rows(sweep: u64, sector: u32, keys: &[u32]) -> PartRows {
         let detection = |(place, &key): (usize, &u32)| Detection {
             summary: ClusterSummary { key, first_member: place as u32, points: 1, ..ClusterSummary::default() },
+            first_solid: keys[..place].iter().filter(|&&key| has_solid(key)).count() as u32,
+            solids: u32::from(has_solid(key)),
             ..Detection::default()
         };
+        let solid = |&key: &u32| Solid { centre_m: [key as f32, 0.0, 0.0], ..Solid::default() };
         PartRows {
             part: Part { ordinal: sweep * 3 + u64::from(sector), sweep, sector, sectors: 3, sensor_time_ns: 0 },
             header: SweepHeader {
@@ -116,11 +131,12 @@ mod tests {
             rejected: false,
             detections: keys.iter().enumerate().map(detection).collect(),
             members: keys.to_vec(),
+            solids: keys.iter().filter(|&&key| has_solid(key)).map(solid).collect(),
         }
     }
 
     #[test]
-    fn clusters_of_several_sectors_are_ordered_by_key_and_keep_their_members() {
+    fn clusters_of_several_sectors_are_ordered_by_key_and_keep_their_members_and_solids() {
         let mut sut = Assembly::default();
         assert!(sut.add(&rows(5, 0, &[1])).is_none());
         assert!(sut.add(&rows(5, 1, &[2, 4])).is_none());
@@ -128,7 +144,10 @@ mod tests {
         let keys: Vec<u32> = sweep.detections.iter().map(|d| d.summary.key).collect();
         assert_eq!(keys, [0, 1, 2, 3, 4]);
         for detection in &sweep.detections {
-            assert_eq!(sweep.members[detection.summary.first_member as usize], detection.summary.key);
+            let key = detection.summary.key;
+            assert_eq!(sweep.members[detection.summary.first_member as usize], key);
+            let centre_m = detection.solid_place().map(|place| sweep.solids[place].centre_m[0]);
+            assert_eq!(centre_m, has_solid(key).then_some(key as f32));
         }
         assert!(sweep.complete);
         assert_eq!((sweep.recorded, sweep.missing_sectors), (5, 0));
@@ -171,6 +190,6 @@ mod tests {
         }
         let sweep = sut.add(&rows(1, 2, &[])).unwrap();
         assert_eq!((sweep.part.sweep, sweep.recorded, sweep.rejected_sectors), (1, 0, 0));
-        assert!(sweep.complete && sweep.detections.is_empty() && sweep.members.is_empty());
+        assert!(sweep.complete && sweep.detections.is_empty() && sweep.members.is_empty() && sweep.solids.is_empty());
     }
 }

@@ -1,7 +1,7 @@
 //! Sweep → one JSON line. Numbers are the shortest that read back as the same value, so equal sweeps are equal bytes.
 
 use lidar::ObstacleClass;
-use messages::{Detection, Refusal};
+use messages::{Detection, Refusal, Solid};
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 
@@ -19,7 +19,7 @@ pub(crate) fn write_line(sweep: &SweepRows, line: &mut Vec<u8>) -> Result<(), se
             refused: Refused(&sweep.refused),
             missing_sectors: sweep.missing_sectors,
             rejected_sectors: sweep.rejected_sectors,
-            detections: Rows(&sweep.detections),
+            detections: Rows(sweep),
         },
     )?;
     line.push(b'\n');
@@ -59,13 +59,16 @@ impl Serialize for Refused<'_> {
     }
 }
 
-struct Rows<'a>(&'a [Detection]);
+struct Rows<'a>(&'a SweepRows);
 
 impl Serialize for Rows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut rows = serializer.serialize_seq(Some(self.0.len()))?;
-        for (cluster, detection) in self.0.iter().enumerate() {
-            rows.serialize_element(&Row::new(cluster, detection))?;
+        let Self(sweep) = self;
+        let mut rows = serializer.serialize_seq(Some(sweep.detections.len()))?;
+        for (cluster, detection) in sweep.detections.iter().enumerate() {
+            // Places were checked when the part was accepted.
+            let solid = detection.solid_place().and_then(|place| sweep.solids.get(place));
+            rows.serialize_element(&Row::new(cluster, detection, solid))?;
         }
         rows.end()
     }
@@ -78,16 +81,18 @@ struct Row {
     class: ObstacleClass,
     posterior: Option<Posterior>,
     centroid_m: [f32; 3],
-    /// The solid's pose and size: null until a solid is fitted.
+    /// The solid's pose and size, and how well its centre is known: null without one.
     centre_m: Option<[f32; 3]>,
     size_m: Option<[f32; 3]>,
     attitude_wxyz: Option<[f32; 4]>,
+    /// Row by row.
+    centre_covariance_m2: Option<[f32; 9]>,
     range_m: f32,
     rings: u32,
 }
 
 impl Row {
-    fn new(cluster: usize, detection: &Detection) -> Self {
+    fn new(cluster: usize, detection: &Detection, solid: Option<&Solid>) -> Self {
         let [rectangular, ellipsoidal, cylindrical, conical] = detection.posterior;
         let posterior = Posterior { rectangular, ellipsoidal, cylindrical, conical };
         Self {
@@ -96,13 +101,18 @@ impl Row {
             class: detection.class,
             posterior: detection.class.solid_index().map(|_| posterior),
             centroid_m: detection.summary.centroid_m,
-            centre_m: None,
-            size_m: None,
-            attitude_wxyz: None,
+            centre_m: solid.map(|solid| solid.centre_m),
+            size_m: solid.map(|solid| solid.size_m),
+            attitude_wxyz: solid.map(|solid| solid.attitude_wxyz),
+            centre_covariance_m2: solid.map(centre_covariance_m2),
             range_m: detection.summary.range_m(),
             rings: detection.summary.rings,
         }
     }
+}
+
+fn centre_covariance_m2(solid: &Solid) -> [f32; 9] {
+    std::array::from_fn(|place| solid.covariance_of(place / 3, place % 3))
 }
 
 #[derive(Serialize)]
@@ -145,9 +155,16 @@ mod tests {
                 ..ClusterSummary::default()
             },
             posterior: [0.01, 0.02, 0.07, 0.9],
+            first_solid: 1,
+            solids: 1,
             class: ObstacleClass::Conical,
             reserved: [0; 3],
         };
+        let mut solid = Solid { centre_m: [3.5, -4.0, 0.2], size_m: [1.0, 1.0, 2.5], ..Solid::default() };
+        // The first three rows of the triangle begin at 0, 9 and 17.
+        for (place, value) in [(0, 0.01), (1, 0.02), (2, 0.03), (9, 0.04), (10, 0.05), (17, 0.06)] {
+            solid.covariance[place] = value;
+        }
         let unclassified = Detection {
             summary: ClusterSummary { key: 9, points: 1, rings: 1, centroid_m: [0.0, 2.0, 0.0], ..conical.summary },
             ..Detection::default()
@@ -159,6 +176,7 @@ mod tests {
             missing_sectors: 1,
             rejected_sectors: 2,
             detections: vec![conical, unclassified],
+            solids: vec![Solid::default(), solid],
             ..SweepRows::default()
         };
         let expected = concat!(
@@ -166,9 +184,11 @@ mod tests {
             r#""refused":{"not_finite":2,"too_near":1},"missing_sectors":1,"rejected_sectors":2,"detections":["#,
             r#"{"cluster":0,"points":123,"class":"conical","#,
             r#""posterior":{"rectangular":0.01,"ellipsoidal":0.02,"cylindrical":0.07,"conical":0.9},"#,
-            r#""centroid_m":[3.0,-4.0,0.1],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":5.001,"rings":4},"#,
+            r#""centroid_m":[3.0,-4.0,0.1],"centre_m":[3.5,-4.0,0.2],"size_m":[1.0,1.0,2.5],"attitude_wxyz":[1.0,0.0,0.0,0.0],"#,
+            r#""centre_covariance_m2":[0.01,0.02,0.03,0.02,0.04,0.05,0.03,0.05,0.06],"range_m":5.001,"rings":4},"#,
             r#"{"cluster":1,"points":1,"class":"unclassified","posterior":null,"#,
-            r#""centroid_m":[0.0,2.0,0.0],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":2.0,"rings":1}]}"#,
+            r#""centroid_m":[0.0,2.0,0.0],"centre_m":null,"size_m":null,"attitude_wxyz":null,"#,
+            r#""centre_covariance_m2":null,"range_m":2.0,"rings":1}]}"#,
             "\n"
         );
         assert_eq!(line(&sweep), expected);

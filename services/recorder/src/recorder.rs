@@ -120,7 +120,7 @@ impl Sink for Recorder {
 
     /// Counts the part, copies its rows into a free buffer and passes it on. Never waits unless `lossless`.
     ///
-    /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members out of place.
+    /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members or solids out of place.
     fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
         let verdict = self.take(trace, input);
         self.statistics.add(trace, input, verdict);

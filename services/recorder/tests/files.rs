@@ -9,7 +9,7 @@ use std::path::Path;
 
 use common::{HandMade, Line, lines, rows, settings, settings_in, start};
 use lidar::ObstacleClass;
-use messages::{Detections, Trace, Verdict};
+use messages::{Detections, Solid, Trace, Verdict};
 use proptest::prelude::*;
 use recorder::{RecorderError, Settings};
 use stage::Sink;
@@ -50,9 +50,12 @@ fn a_short_run_gives_exactly_these_files() {
         concat!(
             r#"{"sweep":0,"complete":true,"sensor_time_ns":0,"returns":3,"refused":{"too_near":2},"detections":["#,
             r#"{"cluster":0,"points":2,"class":"conical","posterior":{"rectangular":0.1,"ellipsoidal":0.2,"cylindrical":0.3,"conical":0.4},"#,
-            r#""centroid_m":[0.0,-1.0,0.1],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":1.0049876,"rings":1},"#,
+            r#""centroid_m":[0.0,-1.0,0.1],"centre_m":[0.0,0.25,-0.0],"size_m":[1.0,2.0,3.0],"attitude_wxyz":[0.6,0.8,0.0,0.0],"#,
+            r#""centre_covariance_m2":[0.0,0.015625,0.03125,0.015625,0.140625,0.15625,0.03125,0.15625,0.265625],"#,
+            r#""range_m":1.0049876,"rings":1},"#,
             r#"{"cluster":1,"points":1,"class":"unclassified","posterior":null,"#,
-            r#""centroid_m":[0.33333334,-0.5,0.1],"centre_m":null,"size_m":null,"attitude_wxyz":null,"range_m":0.60918885,"rings":2}]}"#,
+            r#""centroid_m":[0.33333334,-0.5,0.1],"centre_m":null,"size_m":null,"attitude_wxyz":null,"centre_covariance_m2":null,"#,
+            r#""range_m":0.60918885,"rings":2}]}"#,
             "\n",
             r#"{"sweep":1,"complete":true,"sensor_time_ns":100000000,"returns":0,"refused":{},"detections":[]}"#,
             "\n"
@@ -102,6 +105,7 @@ fn a_part_that_a_stage_rejected_gives_a_line_that_says_so() {
     trace.hops[1].verdict = Verdict::RejectedIncomplete;
     detections.detections.clear();
     detections.members.clear();
+    detections.solids.clear();
     let (text, labels) = record(&vec![(trace, detections)], |settings| settings);
     let line: Line = serde_json::from_str(&text).unwrap();
     assert_eq!((line.complete, line.rejected_sectors, line.detections.len()), (false, Some(1), 0));
@@ -111,7 +115,7 @@ fn a_part_that_a_stage_rejected_gives_a_line_that_says_so() {
 // verifies REC-005
 #[test]
 fn a_message_that_contradicts_itself_is_rejected_and_leaves_no_line() {
-    let spoil: [fn(&mut Detections); 7] = [
+    let spoil: [fn(&mut Detections); 12] = [
         |d| d.detections[1].summary.points = u32::MAX,
         |d| d.detections[1].summary.first_member = u32::MAX,
         |d| d.detections[1].summary.points = 0,
@@ -119,6 +123,11 @@ fn a_message_that_contradicts_itself_is_rejected_and_leaves_no_line() {
         |d| d.members.truncate(d.members.len() - 1),
         |d| d.header.recorded += 1,
         |d| d.detections.truncate(3),
+        |d| d.detections[1].solids = 2,
+        |d| d.detections[1].solids = 0,
+        |d| d.detections[1].first_solid = u32::MAX,
+        |d| d.detections[1].first_solid = 0,
+        |d| d.solids.truncate(d.solids.len() - 1),
     ];
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = start(settings_in(folder.path())).unwrap();
@@ -173,7 +182,12 @@ fn check_read_back(folder: &Path, message: &Detections) {
         assert_eq!(row.class, detection.class);
         assert_eq!(row.centroid_m.map(f32::to_bits), detection.summary.centroid_m.map(f32::to_bits));
         assert_eq!(row.range_m.to_bits(), detection.summary.range_m().to_bits());
-        assert!(row.centre_m.is_none() && row.size_m.is_none() && row.attitude_wxyz.is_none());
+        let solid = detection.solid_place().map(|place| message.solids[place]);
+        assert_eq!(row.centre_m, solid.map(|solid| solid.centre_m));
+        assert_eq!(row.size_m, solid.map(|solid| solid.size_m));
+        assert_eq!(row.attitude_wxyz, solid.map(|solid| solid.attitude_wxyz));
+        let covariance = |solid: Solid| std::array::from_fn(|place| solid.covariance_of(place / 3, place % 3));
+        assert_eq!(row.centre_covariance_m2, solid.map(covariance));
         match (&row.posterior, detection.class.solid_index()) {
             (None, None) => {}
             (Some(posterior), Some(_)) => {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use lidar::ObstacleClass;
-use messages::{ClusterSummary, Detection, Detections, Hop, Part, Trace};
+use messages::{ClusterSummary, Detection, Detections, Hop, MAX_FITS, Part, Solid, Trace};
 use recorder::{Recorder, RecorderError, Settings};
 use serde::Deserialize;
 use zerocopy::FromZeros;
@@ -117,6 +117,7 @@ impl HandMade {
             let here = self.clusters.iter().enumerate().filter(|&(place, _)| closes_in(place) == sector);
             for (place, (members, class)) in here {
                 let posterior = if *class == ObstacleClass::Unclassified { [0.0; 4] } else { [0.1, 0.2, 0.3, 0.4] };
+                let has_solid = *class != ObstacleClass::Unclassified && place < MAX_FITS;
                 let detection = Detection {
                     summary: ClusterSummary {
                         key: members[0],
@@ -128,9 +129,14 @@ impl HandMade {
                         centroid_m: [place as f32 / 3.0, -1.0 / (1.0 + place as f32), 0.1],
                     },
                     posterior,
+                    first_solid: message.solids.len() as u32,
+                    solids: u32::from(has_solid),
                     class: *class,
                     reserved: [0; 3],
                 };
+                if has_solid {
+                    message.solids.push(solid_of(place)).unwrap();
+                }
                 message.detections.push(detection).unwrap();
                 message.members.extend_from_slice(members).unwrap();
             }
@@ -144,6 +150,17 @@ impl HandMade {
             (trace(part), message)
         };
         (0..sectors).map(part).collect()
+    }
+}
+
+/// Unlike that of any other place.
+fn solid_of(place: usize) -> Solid {
+    let number = place as f32;
+    Solid {
+        centre_m: [number, 0.25, -number],
+        attitude_wxyz: [0.6, 0.8, 0.0, 0.0],
+        size_m: [1.0 + number / 3.0, 2.0, 3.0],
+        covariance: std::array::from_fn(|entry| number + entry as f32 / 64.0),
     }
 }
 
@@ -188,6 +205,7 @@ pub struct Row {
     pub centre_m: Option<[f32; 3]>,
     pub size_m: Option<[f32; 3]>,
     pub attitude_wxyz: Option<[f32; 4]>,
+    pub centre_covariance_m2: Option<[f32; 9]>,
     pub range_m: f32,
     pub rings: u32,
 }
