@@ -10,7 +10,7 @@ use std::path::Path;
 use serde_json::Value;
 use support::{encke, text};
 
-const STAGES: [&str; 5] = ["cluster", "normals", "histogram", "svm", "paper_chain"];
+const STAGES: [&str; 7] = ["cluster", "normals", "histogram", "svm", "fit", "paper_chain", "full_chain"];
 
 /// The lines of `encke bench --json` with three runs.
 fn bench(args: &[&str]) -> Vec<Value> {
@@ -27,6 +27,15 @@ fn assert_stages(lines: &[Value]) {
         let [median_ms, min_ms] = ["median_ms", "min_ms"].map(|key| line[key].as_f64().unwrap());
         assert!(0.0 < min_ms && min_ms <= median_ms, "{line}");
         assert_eq!(line["who"], "encke");
+        let fits = ["fits", "evaluations"].map(|key| line[key].as_f64());
+        match (line["stage"].as_str(), fits) {
+            (Some("fit"), [Some(fits), Some(evaluations)]) => {
+                assert!(fits <= line["described"].as_f64().unwrap());
+                assert_eq!(fits > 0.0, evaluations > 0.0, "{line}");
+            }
+            (Some("fit"), _) => panic!("{line}"),
+            (_, fits) => assert_eq!(fits, [None, None], "{line}"),
+        }
     }
 }
 
@@ -73,23 +82,52 @@ fn every_stage_has_a_line_that_says_what_it_worked_on() {
         assert_stages(&lines);
         for line in &lines {
             assert_eq!((&line["sweep"], &line["n"]), (&"two-walls".into(), &72.into()), "{line}");
-            assert_eq!(line["support_vectors"], lines[0]["support_vectors"]);
+            if line["stage"] != "full_chain" {
+                assert_eq!(line["support_vectors"], lines[0]["support_vectors"], "{line}");
+            }
         }
-        let line = &lines[0];
-        ["clusters", "described", "support_vectors"].map(|key| line[key].as_u64().unwrap())
+        let line = lines.iter().find(|line| line["stage"] == "fit").unwrap();
+        ["clusters", "described", "fits", "support_vectors"].map(|key| line[key].as_u64().unwrap())
     };
-    let [clusters, described, support_vectors] = counts(&[]);
-    assert_eq!((clusters, described), (3, 2));
+    let [clusters, described, fits, support_vectors] = counts(&[]);
+    assert_eq!((clusters, described, fits), (3, 2, 2));
     assert!(support_vectors > 4);
-    assert_eq!(counts(&["--range", "9"])[..2], [2, 1], "the walls are one");
-    assert_eq!(counts(&["--min-points", "31"])[..2], [3, 1]);
-    assert_eq!(counts(&["--min-points", "41"])[..2], [3, 0]);
-    assert_eq!(counts(&["--min-points", "2"])[..2], [3, 2], "five points are the least for features");
+    assert_eq!(counts(&["--range", "9"])[..3], [2, 1, 0], "the walls are one, too wide for a solid");
+    assert_eq!(counts(&["--min-points", "31"])[..3], [3, 1, 1]);
+    assert_eq!(counts(&["--min-points", "41"])[..3], [3, 0, 0]);
+    assert_eq!(counts(&["--min-points", "2"])[..3], [3, 2, 2], "five points are the least for features");
 
     let model = dir.path().join("two.libsvm");
     let head = "svm_type c_svc\nkernel_type rbf\ngamma 1\nnr_class 2\ntotal_sv 2\nrho 0\nlabel 1 4\nnr_sv 1 1\nSV\n";
     fs::write(&model, format!("{head}1 1:1\n-1 2:1\n")).unwrap();
-    assert_eq!(counts(&["--model", &model.display().to_string()]), [3, 2, 2], "needs no probabilities and no card");
+    assert_eq!(counts(&["--model", &model.display().to_string()]), [3, 2, 2, 2], "needs no probabilities and no card");
+}
+
+#[test]
+fn the_full_chain_is_the_configured_one_and_all_other_lines_are_the_same_whatever_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("two-walls.csv");
+    write_walls(&path);
+    let chain = dir.path().join("chain.toml");
+    fs::copy("config/chain.toml", &chain).unwrap();
+    fs::create_dir(dir.path().join("stages")).unwrap();
+    fs::copy("config/stages/clusterer.toml", dir.path().join("stages/clusterer.toml")).unwrap();
+    let mut extractor: toml::Table = fs::read_to_string("config/stages/extractor.toml").unwrap().parse().unwrap();
+    extractor.insert("histogram".to_owned(), true.into());
+    extractor.insert("solids".to_owned(), false.into());
+    fs::write(dir.path().join("stages/extractor.toml"), extractor.to_string()).unwrap();
+    for (method, model) in [("naive-bayes", "paper-nb"), ("svm", "paper-svm")] {
+        let classifier = format!("method = {method:?}\nmodel = {model:?}\n");
+        fs::write(dir.path().join("stages/classifier.toml"), classifier).unwrap();
+        let lines = bench(&["--from", &path.display().to_string(), "--chain", &chain.display().to_string()]);
+        assert_stages(&lines);
+        for line in &lines {
+            let full = line["stage"] == "full_chain";
+            assert_eq!(line["model"], if full { model } else { "paper-svm" }, "{line}");
+            assert_eq!(line["support_vectors"] == 0, full && method != "svm", "{line}");
+            assert!(line["stage"] != "fit" || line["fits"] == 2, "{line}");
+        }
+    }
 }
 
 #[test]
@@ -127,6 +165,7 @@ fn without_json_there_is_a_table_for_people() {
     let table = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert!(table.contains("two-walls: 72 returns, 3 clusters, 2 with features"), "{table}");
+    assert!(table.lines().any(|line| line.starts_with("fit ") && line.contains("2 fits of ")), "{table}");
     assert!(STAGES.iter().all(|stage| table.lines().any(|line| line.starts_with(stage))), "{table}");
 }
 

@@ -7,7 +7,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
-use support::{encke, text};
+use support::{Run, encke, sum, text};
 
 /// Runs `encke` and expects it to refuse: exit 2, one line that holds all of `words`.
 fn refused(args: &[&str], words: &[&str]) {
@@ -61,14 +61,34 @@ fn a_broken_configuration_names_file_key_and_remedy() {
     with("stages/clusterer.toml", "range_d_m = 1.0", "range_d_m = -1.0", &["stages/clusterer.toml", "range_d_m", "-1"]);
     with("stages/clusterer.toml", "range_d_m = 1.0", "range_d = 1.0", &["stages/clusterer.toml", "range_d"]);
     with("scenes/default.toml", "dropout", "dropuot", &["scenes/default.toml", "dropuot"]);
-    with(
-        "stages/extractor.toml",
-        "spacing_deg = 0.72",
-        "spacing_deg = 0.5",
-        &["paper-svm", "spacing_deg = 0.72", "0.5"],
-    );
-    with("models/paper-svm/card.toml", "sha256 = \"", "sha256 = \"0", &["paper-svm", "sha256"]);
-    with("stages/classifier.toml", "\"paper-svm\"", "\"paper-none\"", &["paper-none"]);
+    let fewer = ["\"solids\" was trained with", "fit.evaluations = 28000", "has", "fit.evaluations = 20000"];
+    with("stages/extractor.toml", "evaluations = 28000", "evaluations = 20000", &fewer);
+    with("stages/extractor.toml", "solids = true", "solids = false", &["histogram and solids are both false"]);
+    with("models/solids/card.toml", "sha256 = \"", "sha256 = \"0", &["solids", "sha256"]);
+    with("stages/classifier.toml", "model = \"solids\"", "model = \"none\"", &["models/none/card.toml"]);
+    with("stages/classifier.toml", "model = \"solids\"", "model = \"paper-svm\"", &["paper-svm", "histogram = true"]);
+}
+
+#[test]
+fn the_papers_classifiers_stay_choosable() {
+    let dir = tempfile::tempdir().unwrap();
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("config"), dir.path());
+    let chain = dir.path().join("chain.toml").display().to_string();
+    let extractor = dir.path().join("stages/extractor.toml");
+    let shipped = fs::read_to_string(&extractor).unwrap();
+    let histogram = shipped.replace("histogram = false", "histogram = true").replace("solids = true", "solids = false");
+    fs::write(&extractor, &histogram).unwrap();
+    for (method, model) in [("svm", "paper-svm"), ("naive-bayes", "paper-nb")] {
+        let classifier = format!("method = \"{method}\"\nmodel = \"{model}\"\nleast_posterior = 0.0\n");
+        fs::write(dir.path().join("stages/classifier.toml"), classifier).unwrap();
+        let run = Run::new(&["--chain", &chain, "--sweeps", "2", "--pace", "fast"]).finish().expect_code(0);
+        let classified: u64 =
+            sum(&run.report["detections"]) - run.report["detections"]["unclassified"].as_u64().unwrap();
+        assert!(classified > 20, "{method}: {}", run.report["detections"]);
+        fs::write(&extractor, histogram.replace("spacing_deg = 0.72", "spacing_deg = 0.5")).unwrap();
+        refused(&["run", "--chain", &chain, "--sweeps", "1"], &[model, "spacing_deg = 0.72", "spacing_deg = 0.5"]);
+        fs::write(&extractor, &histogram).unwrap();
+    }
 }
 
 fn copy(from: &Path, to: &Path) {

@@ -1,6 +1,8 @@
 //! `encke bench`: what each stage's work costs on one sweep, without processes, on one thread.
 
-mod machine;
+mod clustering;
+mod extraction;
+mod judge;
 mod measure;
 mod stages;
 mod surface;
@@ -41,7 +43,7 @@ pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
         for stage in STAGES {
             let times = measure::repeat(args.runs, || bench.run(stage))
                 .map_err(|cause| Failure::run(format!("{name}, {}: {cause}", stage.name)))?;
-            let (model, support_vectors) = bench.model();
+            let (judge, fits) = (bench.judge_of(stage), bench.fits_of(stage));
             let line = Line {
                 who: "encke",
                 stage: stage.name,
@@ -49,15 +51,16 @@ pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
                 n: bench.returns(),
                 clusters: bench.found(),
                 described: bench.described(),
-                model,
-                support_vectors,
+                model: &judge.name,
+                support_vectors: judge.support_vectors,
+                fits: fits.map(|(fits, _)| fits),
+                evaluations: fits.map(|(_, evaluations)| evaluations),
                 runs: args.runs,
                 median_ms: times.median_ms,
                 min_ms: times.min_ms,
             };
             let json = || serde_json::to_string(&line).map_err(Failure::run);
-            let text = || Ok(format!("{:<12} {:>12.4} {:>12.4}", line.stage, line.median_ms, line.min_ms));
-            crate::print(&(if args.json { json()? } else { text()? } + "\n"))?;
+            crate::print(&(if args.json { json()? } else { row(&line) } + "\n"))?;
         }
     }
     Ok(())
@@ -74,21 +77,41 @@ struct Line<'a> {
     clusters: usize,
     /// Clusters with features.
     described: usize,
+    /// The stage's own model, or the one of `svm`.
     model: &'a str,
     support_vectors: usize,
+    /// Of `fit`: clusters with fitted solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fits: Option<usize>,
+    /// Of `fit`: mean number of residuals evaluated for one cluster.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    evaluations: Option<f64>,
     runs: u32,
     median_ms: f64,
     min_ms: f64,
 }
 
+/// A line of the table.
+fn row(line: &Line) -> String {
+    let times = format!("{:<12} {:>12.4} {:>12.4}", line.stage, line.median_ms, line.min_ms);
+    let note = match (line.fits, line.evaluations) {
+        (Some(fits), Some(evaluations)) => format!("  {fits} fits of {evaluations:.0} evaluations"),
+        _ if line.stage == stages::FULL_CHAIN => format!("  {}", line.model),
+        _ => return times,
+    };
+    times + &note
+}
+
 fn heading(name: &str, bench: &Workbench, runs: u32) -> String {
-    let (model, support_vectors) = bench.model();
+    let svm = &bench.svm;
     format!(
-        "sweep {name}: {} returns, {} clusters, {} with features; {model}, {support_vectors} support vectors; {runs} runs\n\
+        "sweep {name}: {} returns, {} clusters, {} with features; {}, {} support vectors; {runs} runs\n\
          {:<12} {:>12} {:>12}\n",
         bench.returns(),
         bench.found(),
         bench.described(),
+        svm.name,
+        svm.support_vectors,
         "stage",
         "median [ms]",
         "min [ms]",

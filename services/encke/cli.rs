@@ -36,8 +36,8 @@ pub(crate) enum Command {
     /// Train the paper's classifiers on simulated obstacles.
     #[command(after_help = "Example:\n  encke train --plan config/training/paper.toml --out config/models")]
     Train(TrainArgs),
-    /// Repeat the paper's experiments: tables and figures as a page, and as JSON.
-    #[command(after_help = "Example:\n  encke evaluate --paper --out report/")]
+    /// Measure the chain's classifier against its bars; exit 1 where one falls short. Or repeat the paper's experiments.
+    #[command(after_help = EVALUATE_NOTES)]
     Evaluate(EvaluateArgs),
     /// Time each stage's work on one sweep, without processes, on one thread.
     #[command(after_help = BENCH_NOTES)]
@@ -62,16 +62,32 @@ const SIMULATE_EXAMPLES: &str = "Examples:
   encke simulate --scene config/scenes/default.toml --sweeps 50 --out scene.pcap
   encke simulate --scene config/scenes/reference.toml --sweeps 5 --out sweeps/";
 
+const EVALUATE_NOTES: &str = "\
+Simulated scenes that nothing was trained on go through clusterer, extractor and the classifier,
+as configured. What is looked at, and the targets: config/evaluation/reference.toml; what each
+bar measures: services/ground/README.md.
+Exit codes: 0 all bars hold, 1 one falls short, 2 cannot start.
+
+Examples:
+  encke evaluate                                   the bars as a table
+  encke evaluate --out report/                     with plots: report/evaluate.html
+  encke evaluate --from capture.pcap               and how much is claimed of a recording
+  encke evaluate --paper --out report/             the paper's tables and figures: report/paper.html";
+
 const BENCH_NOTES: &str = "Stages, each on what those before it left:
   cluster      the clusterer's `process`: clusters, and the cells round them
   normals      nearest neighbours of every point, and normals; clusters with features only
   histogram    angles of all pairs and the joint histogram, on the neighbours and normals found
   svm          the classifier's `process` with its support vector machine, posterior included;
-               with --model: decision values and votes, no posterior
-  paper_chain  cluster, the extractor's whole `process` (normals, histogram, choice of columns), svm
+               with --model: decision values and votes, cluster by cluster, no posterior
+  fit          the extractor's whole `process` from the clusters, with solids and no histograms
+  paper_chain  cluster, the extractor's whole `process` with histograms (normals, histogram,
+               choice of columns) and no solids, svm
+  full_chain   cluster, extractor and classifier as their files have them
 
 The sweep is a recording's first complete one (its first where none is), or a scene's first.
 Reading it is not timed. All runs must give the same output to the byte, else the exit code is 1.
+JSON lines of `fit` also say how many clusters had a fit, and the mean of residuals evaluated for one.
 
 Examples:
   encke bench --from config/scenes/default.toml
@@ -235,18 +251,31 @@ pub(crate) struct TrainArgs {
 /// Options of `encke evaluate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EvaluateArgs {
-    /// The paper's experiments.
-    #[arg(long, required = true)]
+    /// Repeat the paper's experiments instead.
+    #[arg(long, requires = "out", conflicts_with_all = ["from", "format", "sensor", "chain"])]
     pub(crate) paper: bool,
-    /// What to train and test on.
-    #[arg(long, value_name = "FILE.toml", default_value = "config/training/paper.toml")]
-    pub(crate) plan: PathBuf,
-    /// Folder for paper.json and paper.html.
+    /// What to look at, and the targets. [default: config/evaluation/reference.toml; with --paper
+    /// config/training/paper.toml]
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Folder for evaluate.json and evaluate.html, or paper.json and paper.html.
     #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    pub(crate) out: Option<PathBuf>,
     /// Print the JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Also say how much is claimed of this recording, whose truth is not known.
+    #[arg(long, value_name = "RECORDING")]
+    pub(crate) from: Option<PathBuf>,
+    /// Format of the recording, where it is not to be found by content.
+    #[arg(long, requires = "from")]
+    pub(crate) format: Option<String>,
+    /// Sensor model of the recording: the stem of a file in config/sensors.
+    #[arg(long, value_name = "NAME", requires = "from")]
+    pub(crate) sensor: Option<String>,
+    /// Topology and parameters: [default: ./config/chain.toml, else the one built in]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) chain: Option<PathBuf>,
 }
 
 /// Options of `encke bench`.
@@ -264,7 +293,7 @@ pub(crate) struct BenchArgs {
     /// Clusters of fewer points get no features; under 5 none does. [default: its file's min_points]
     #[arg(long, value_name = "N")]
     pub(crate) min_points: Option<u32>,
-    /// Another support vector machine, in libsvm's format; it needs no card.
+    /// Another support vector machine for svm and paper_chain, in libsvm's format; it needs no card.
     #[arg(long, value_name = "FILE.libsvm")]
     pub(crate) model: Option<PathBuf>,
     /// Topology and parameters: [default: ./config/chain.toml, else the one built in]

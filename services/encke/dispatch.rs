@@ -1,6 +1,6 @@
 //! Which name is which stage.
 
-use classifier::{Card, Classifier, FeatureDefinition, ModelFiles};
+use classifier::{Card, Classifier, FeatureDefinition, ModelFiles, SolidsDefinition};
 use clusterer::Clusterer;
 use extractor::Extractor;
 use recorder::{Recorder, Settings};
@@ -87,26 +87,42 @@ pub(crate) fn add_model(plan: &Plan, assets: &Assets, params: &mut classifier::P
     let folder = format!("models/{}", params.model);
     let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
     let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
-    fits_extractor(plan, &parsed.features, &params.model)?;
+    fits_extractor(plan, &parsed, &params.model)?;
     let model = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
     params.files = Some(ModelFiles { card, model });
     Ok(())
 }
 
 /// A model judges only what the extractor that it was trained with describes.
-fn fits_extractor(plan: &Plan, features: &FeatureDefinition, model: &str) -> Result<(), Failure> {
+fn fits_extractor(plan: &Plan, card: &Card, model: &str) -> Result<(), Failure> {
     let text = plan.parameters.get(Extractor::NAME).map_or("", String::as_str);
     // The extractor itself says what is wrong with its file.
     let Ok(found) = toml::from_str::<extractor::Params>(text) else { return Ok(()) };
-    let (neighbours, spacing_deg) = (features.neighbours, features.spacing_deg);
-    if (found.neighbours, found.spacing_deg) == (neighbours, spacing_deg) {
-        return Ok(());
+    let refused = |trained: String, has: String| {
+        let remedy = "train anew, or set them back in stages/extractor.toml";
+        Err(Failure::start(format!("model {model:?} was trained with {trained}; the extractor has {has}: {remedy}")))
+    };
+    if let Some(SolidsDefinition { evaluations, scouting_rays, rays, .. }) = card.solids {
+        let said = |solids, (evaluations, scouting_rays, rays)| {
+            format!(
+                "solids = {solids}, fit.evaluations = {evaluations}, fit.scouting_rays = {scouting_rays}, fit.rays = {rays}"
+            )
+        };
+        let (trained, has) = (
+            said(true, (evaluations, scouting_rays, rays)),
+            said(found.solids, (found.fit.evaluations, found.fit.scouting_rays, found.fit.rays)),
+        );
+        return if trained == has { Ok(()) } else { refused(trained, has) };
     }
-    Err(Failure::start(format!(
-        "model {model:?} was trained with neighbours = {neighbours}, spacing_deg = {spacing_deg}; the extractor has {}, {}: \
-         train anew, or set them back",
-        found.neighbours, found.spacing_deg
-    )))
+    if let Some(FeatureDefinition { neighbours, spacing_deg, .. }) = card.features {
+        let said = |histogram, (neighbours, spacing_deg)| {
+            format!("histogram = {histogram}, neighbours = {neighbours}, spacing_deg = {spacing_deg}")
+        };
+        let (trained, has) =
+            (said(true, (neighbours, spacing_deg)), said(found.histogram, (found.neighbours, found.spacing_deg)));
+        return if trained == has { Ok(()) } else { refused(trained, has) };
+    }
+    Ok(())
 }
 
 /// Reads a stage's parameters, lets `complete` add what lies in other files, and builds the stage.
