@@ -117,7 +117,7 @@ fn the_full_chain_is_the_configured_one_and_all_other_lines_are_the_same_whateve
     extractor.insert("solids".to_owned(), false.into());
     fs::write(dir.path().join("stages/extractor.toml"), extractor.to_string()).unwrap();
     for (method, model) in [("naive-bayes", "paper-nb"), ("svm", "paper-svm")] {
-        let classifier = format!("method = {method:?}\nmodel = {model:?}\n");
+        let classifier = format!("method = {method:?}\nmodel = {model:?}\nleast_posterior = 0.0\n");
         fs::write(dir.path().join("stages/classifier.toml"), classifier).unwrap();
         let lines = bench(&["--from", &path.display().to_string(), "--chain", &chain.display().to_string()]);
         assert_stages(&lines);
