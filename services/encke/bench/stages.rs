@@ -39,7 +39,8 @@ const FIT: &str = "fit";
 pub(super) const FULL_CHAIN: &str = "full_chain";
 
 /// Every sweep is whole.
-pub(super) const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0 };
+pub(super) const PART: Part =
+    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
 
 /// A stage would not take the sweep.
 #[derive(Debug, thiserror::Error)]

@@ -122,7 +122,7 @@ mod tests {
         };
         let solid = |&key: &u32| Solid { centre_m: [key as f32, 0.0, 0.0], ..Solid::default() };
         PartRows {
-            part: Part { ordinal: sweep * 3 + u64::from(sector), sweep, sector, sectors: 3, sensor_time_ns: 0 },
+            part: Part { ordinal: sweep * 3 + u64::from(sector), sweep, sector, sectors: 3, ..Part::default() },
             header: SweepHeader {
                 recorded: keys.len() as u32,
                 complete: u32::from(sector == 2),

@@ -28,7 +28,7 @@ fn hop(free_ns: u64, received_ns: u64, started_ns: u64, finished_ns: u64) -> Hop
 
 /// A whole sweep that was due at 1 s, with these hops.
 fn swept(sweep: u64, hops: &[Hop]) -> Trace {
-    let part = Part { ordinal: sweep, sweep, sector: 0, sectors: 1, sensor_time_ns: 0 };
+    let part = Part { ordinal: sweep, sweep, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
     let mut trace = Trace { part, due_ns: 1_000 * MS, ..Trace::default() };
     hops.iter().for_each(|&hop| trace.push(hop));
     trace

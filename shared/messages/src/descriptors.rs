@@ -64,7 +64,7 @@ pub struct Descriptors {
 }
 
 impl Message for Descriptors {
-    const TYPE: &'static str = "encke.Descriptors.2";
+    const TYPE: &'static str = "encke.Descriptors.3";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

@@ -43,7 +43,7 @@ pub struct Detections {
 }
 
 impl Message for Detections {
-    const TYPE: &'static str = "encke.Detections.2";
+    const TYPE: &'static str = "encke.Detections.3";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

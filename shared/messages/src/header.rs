@@ -33,6 +33,9 @@ impl Refusal {
 }
 
 /// What every message of the chain says of its sweep. Written by the source, passed on unchanged.
+///
+/// `recorded` and `refused` are of the part; all else is the same in every part, except that `complete` may still be 0
+/// before the last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout)]
 #[repr(C)]
 pub struct SweepHeader {
@@ -42,7 +45,7 @@ pub struct SweepHeader {
     pub period_ns: u64,
     /// Returns of this part as recorded, refused ones included.
     pub recorded: u32,
-    /// Refused returns by [`Refusal`].
+    /// Refused returns by [`Refusal`]; those of the whole sweep are in its last part.
     pub refused: [u32; Refusal::ALL.len()],
     /// 1 when the turn was seen from wrap to wrap; known with the last sector.
     pub complete: u32,
@@ -54,8 +57,9 @@ pub struct SweepHeader {
     pub range_sigma_m: f32,
     /// Farthest range at which the sensor would have seen a surface [m]: beyond it a miss says nothing.
     pub reach_m: f32,
-    /// Fills the struct to a multiple of its alignment.
-    pub reserved: u32,
+    /// Bound on how far returns stray from their columns [rad], positive, where the sweep may be cut (see
+    /// [`crate::Cutter`]); 0 where it may not, and all of it travels in its last sector.
+    pub stray_rad: f32,
 }
 
 impl SweepHeader {

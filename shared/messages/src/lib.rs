@@ -9,7 +9,7 @@
 //! use zerocopy::FromZeros;
 //! let sweep = Sweep::new_box_zeroed().unwrap(); // tests only; stages get shared memory
 //! assert!(sweep.returns.is_empty());
-//! assert_eq!(Clusters::TYPE, "encke.Clusters.2");
+//! assert_eq!(Clusters::TYPE, "encke.Clusters.3");
 //! ```
 
 mod bounded;
@@ -17,7 +17,9 @@ mod clusters;
 mod descriptors;
 mod detections;
 mod header;
+mod sectors;
 mod solids;
+mod step;
 mod sweep;
 mod trace;
 mod truth;
@@ -27,7 +29,9 @@ pub use clusters::{Cell, CellKind, Cluster, ClusterSummary, Clusters, MAX_CELLS,
 pub use descriptors::{Bin, Descriptor, Descriptors, MAX_BINS, MIN_FEATURE_POINTS};
 pub use detections::{Detection, Detections};
 pub use header::{Refusal, SweepHeader};
+pub use sectors::Cutter;
 pub use solids::{Fit, MAX_FITS, RELIEF, SOLID_PARAMETERS, Solid, SolidFit};
+pub use step::Step;
 pub use sweep::Sweep;
 pub use trace::{Hop, MAX_HOPS, Part, Trace, Verdict};
 pub use truth::{MAX_TRUTH_OBJECTS, NO_OBJECT, SolidKind, Truth, TruthObject};

@@ -1,5 +1,7 @@
 use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, KnownLayout};
 
+use crate::Step;
+
 /// Most hops of a chain: the source and seven stages.
 pub const MAX_HOPS: usize = 8;
 
@@ -17,9 +19,18 @@ pub struct Part {
     pub sectors: u32,
     /// Sensor time of the sweep's first firing [ns].
     pub sensor_time_ns: u64,
+    /// Number of the [`Step`] of degradation at which the whole sweep is to be processed.
+    pub step: u32,
+    /// Fills the struct to a multiple of its alignment.
+    pub reserved: u32,
 }
 
 impl Part {
+    /// Degradation at which the whole sweep is to be processed.
+    pub fn step(&self) -> Step {
+        Step::from_number(self.step)
+    }
+
     /// Whether the sweep ends with this part.
     pub fn is_last(&self) -> bool {
         self.sector + 1 >= self.sectors
@@ -45,22 +56,35 @@ pub enum Verdict {
     RejectedSinkFull = 4,
     /// No solids were fitted to the last clusters: the message was full.
     PartialFits = 5,
+    /// Older than the allowed age when it was received: nobody may act on it any more.
+    RejectedStale = 6,
+    /// Left out on purpose: at [`Step::EverySecondSweep`] every odd sweep is.
+    RejectedShed = 7,
 }
 
 impl Verdict {
     /// All verdicts, by their number.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Complete,
         Self::PartialCells,
         Self::RejectedIncomplete,
         Self::RejectedMalformed,
         Self::RejectedSinkFull,
         Self::PartialFits,
+        Self::RejectedStale,
+        Self::RejectedShed,
     ];
 
     /// Whether the part counts as rejected in the ledger.
     pub const fn is_rejected(self) -> bool {
-        matches!(self, Self::RejectedIncomplete | Self::RejectedMalformed | Self::RejectedSinkFull)
+        matches!(
+            self,
+            Self::RejectedIncomplete
+                | Self::RejectedMalformed
+                | Self::RejectedSinkFull
+                | Self::RejectedStale
+                | Self::RejectedShed
+        )
     }
 
     /// The verdict's word in files and reports.
@@ -72,6 +96,8 @@ impl Verdict {
             Self::RejectedIncomplete => "incomplete",
             Self::RejectedMalformed => "malformed",
             Self::RejectedSinkFull => "sink_full",
+            Self::RejectedStale => "stale",
+            Self::RejectedShed => "shed",
         }
     }
 }
@@ -91,6 +117,11 @@ pub struct Hop {
     pub started_ns: u64,
     /// When `process` had ended, just before the output was sent.
     pub finished_ns: u64,
+    /// Part of the time from `free_ns` to `started_ns` in which the stage was ready to run and had no core [ns], as the
+    /// kernel counts it; saturates at 4.3 s.
+    pub taken_before_ns: u32,
+    /// The same of the time from `started_ns` to `finished_ns` [ns].
+    pub taken_busy_ns: u32,
     /// Incarnation of the stage, from 1.
     pub incarnation: u32,
     /// Position of the stage in the chain; the source is 0.
@@ -109,10 +140,10 @@ pub struct Trace {
     pub part: Part,
     /// Host time at which the part's last return was, or should have been, complete [ns].
     pub due_ns: u64,
-    /// Degradation step in force at the source; 0 = none.
-    pub step: u32,
+    /// Host time at which the first firing of the sweep was, or should have been, [ns].
+    pub sweep_start_ns: u64,
     /// Number of hops stamped.
-    pub hop_count: u32,
+    pub hop_count: u64,
     /// The hops, source first.
     pub hops: [Hop; MAX_HOPS],
 }

@@ -52,6 +52,8 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             received_ns,
             started_ns,
             finished_ns,
+            taken_before_ns: 0,
+            taken_busy_ns: 0,
             incarnation: shell.incarnation,
             stage: shell.position,
             verdict,

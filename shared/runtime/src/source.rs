@@ -97,7 +97,15 @@ impl Out<'_> {
             shell.page.put_down();
             return Ok(true);
         }
-        let part = Part { ordinal, sweep: ordinal, sector: 0, sectors: 1, sensor_time_ns: header.sensor_time_ns };
+        let part = Part {
+            ordinal,
+            sweep: ordinal,
+            sector: 0,
+            sectors: 1,
+            sensor_time_ns: header.sensor_time_ns,
+            step: 0,
+            reserved: 0,
+        };
         let mut trace = Trace { part, due_ns, ..Trace::default() };
         trace.push(self.hop(received_ns, started_ns));
         send(shell, sweep, truth, trace)?;
@@ -112,6 +120,8 @@ impl Out<'_> {
             received_ns,
             started_ns,
             finished_ns: clock::now_ns(),
+            taken_before_ns: 0,
+            taken_busy_ns: 0,
             incarnation: self.shell.incarnation,
             stage: self.shell.position,
             verdict: Verdict::Complete,

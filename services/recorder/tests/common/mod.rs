@@ -146,6 +146,7 @@ impl HandMade {
                 sector,
                 sectors,
                 sensor_time_ns: self.sweep * 100_000_000,
+                ..Part::default()
             };
             (trace(part), message)
         };
