@@ -163,7 +163,7 @@ fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
         labels: plan.outputs.labels.clone(),
         statistics: Some(Plan::snapshot_path(shell.instance(), shell.incarnation())),
         resume: shell.incarnation() > 1,
-        queue_parts: WRITER_QUEUE_PARTS.max(plan.chain.queue_parts),
+        queue_parts: WRITER_QUEUE_PARTS.max(plan.chain.queue_parts()),
         lossless: plan.pace == Pace::Fast,
         paced: plan.pace == Pace::Realtime,
         deadline_ms: plan.chain.deadline_ms,

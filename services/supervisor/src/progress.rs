@@ -2,6 +2,8 @@
 
 use std::io::{IsTerminal, Write};
 
+use runtime::Plan;
+
 use crate::child::Watched;
 
 const TERMINAL_PERIOD_NS: u64 = 200_000_000;
@@ -13,14 +15,22 @@ pub(crate) struct Progress {
     next_ns: u64,
     started_ns: u64,
     goal: Option<u64>,
+    sectors: u64,
     shown: bool,
 }
 
 impl Progress {
-    pub(crate) fn new(now_ns: u64, goal: Option<u64>) -> Self {
+    pub(crate) fn new(now_ns: u64, plan: &Plan) -> Self {
         let on_terminal = std::io::stderr().is_terminal();
         let first = if on_terminal { TERMINAL_PERIOD_NS } else { LOG_PERIOD_NS };
-        Self { on_terminal, next_ns: now_ns + first, started_ns: now_ns, goal, shown: false }
+        Self {
+            on_terminal,
+            next_ns: now_ns + first,
+            started_ns: now_ns,
+            goal: plan.sweeps,
+            sectors: u64::from(plan.chain.sectors.max(1)),
+            shown: false,
+        }
     }
 
     /// Shows the line when it is time for it.
@@ -34,10 +44,10 @@ impl Progress {
         let missing: u64 = stages.iter().map(|stage| stage.page.dropped.get() + stage.page.lost.get()).sum();
         let restarts: u64 = stages.iter().map(|stage| stage.restarts.total).sum();
         let line = format!(
-            "{:7.1} s  sweep {}{goal}  answered {}  missing {missing}  restarts {restarts}",
+            "{:7.1} s  sweep {}{goal}  answered {}  parts missing {missing}  restarts {restarts}",
             (now_ns - self.started_ns) as f64 / 1e9,
-            source.page.published.get(),
-            sink.page.processed.get(),
+            source.page.published.get() / self.sectors,
+            sink.page.processed.get() / self.sectors,
         );
         let mut stderr = std::io::stderr().lock();
         // A closed stderr is no reason to stop a chain.

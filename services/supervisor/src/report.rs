@@ -6,6 +6,7 @@ use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::ledger::LedgerReport;
+use crate::overload::OverloadReport;
 use crate::processes::ProcessReport;
 
 /// Everything that is known of a run, as `--report` writes it.
@@ -39,6 +40,8 @@ pub struct Report {
     pub seam_latency_ms: Percentiles,
     /// Misses and what caused them.
     pub deadline: DeadlineReport,
+    /// Overruns, slips, and what was left out under overload.
+    pub overload: OverloadReport,
     /// The sweeps that took longest, longest first.
     pub worst_sweeps: Vec<WorstSweep>,
     /// The processes, the source first, the supervisor last.
@@ -98,12 +101,13 @@ pub(crate) struct Facts<'a> {
     pub(crate) published: u64,
     pub(crate) duration_s: f64,
     pub(crate) processes: Vec<ProcessReport>,
+    pub(crate) overload: OverloadReport,
     pub(crate) stopped: Option<String>,
 }
 
 impl Report {
     pub(crate) fn of(facts: Facts<'_>) -> Self {
-        let Facts { plan, snapshot, ledger, published, duration_s, processes, stopped } = facts;
+        let Facts { plan, snapshot, ledger, published, duration_s, processes, overload, stopped } = facts;
         let stages = snapshot.stages.iter().map(|stage| {
             let latency = StageLatency {
                 transport: stage.transport.percentiles(),
@@ -126,6 +130,7 @@ impl Report {
             obstacle_latency_ms: snapshot.obstacle.percentiles(),
             seam_latency_ms: snapshot.seam.percentiles(),
             deadline: deadline(plan, &snapshot, &ledger),
+            overload,
             worst_sweeps: snapshot.worst,
             processes,
             detections: ObstacleClass::ALL

@@ -32,6 +32,7 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
     }
     write_ledger(text, report)?;
     write_latency(text, report)?;
+    write_overload(text, report)?;
     write_processes(text, report)?;
     let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
     writeln!(text, "\ndetections  {}", classes.join("  "))?;
@@ -105,6 +106,18 @@ fn write_latency(text: &mut String, report: &Report) -> std::fmt::Result {
         writeln!(text, "  {misses} by {cause}")?;
     }
     Ok(())
+}
+
+fn write_overload(text: &mut String, report: &Report) -> std::fmt::Result {
+    let overload = &report.overload;
+    for (stage, overruns) in overload.overruns.iter().filter(|(_, overruns)| **overruns > 0) {
+        writeln!(text, "{stage} overran its budget on {overruns} sweeps")?;
+    }
+    for step in &overload.moves {
+        writeln!(text, "overload: {} to {} at sweep {}: {}", step.from, step.to, step.sweep, step.reason)?;
+    }
+    let unnamed = overload.move_count - overload.moves.len() as u64;
+    if unnamed > 0 { writeln!(text, "overload: {unnamed} more moves") } else { Ok(()) }
 }
 
 fn write_processes(text: &mut String, report: &Report) -> std::fmt::Result {

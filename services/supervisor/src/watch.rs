@@ -10,6 +10,7 @@ use transport::{Instance, Node};
 
 use crate::child::{Ended, Watched};
 use crate::house::House;
+use crate::overload::{Ladder, OverloadReport, Trouble};
 use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS, Usage};
 use crate::progress::Progress;
 use crate::report::{Facts, Report};
@@ -85,6 +86,8 @@ pub(crate) struct Watch<'a> {
     next_sample_ns: u64,
     usage: Usage,
     progress: Progress,
+    ladder: Ladder,
+    overload: OverloadReport,
     /// Every stage was up once.
     begun: bool,
     stop_asked: bool,
@@ -98,7 +101,7 @@ impl<'a> Watch<'a> {
     /// Creates services and pages, then starts the stages: readers before writers, the source last.
     fn begin(house: &'a House, plan: &'a Plan, spawn: bool, signals: Receiver<i32>) -> Result<Self, SupervisorError> {
         let instance = house.instance();
-        let node = Node::join(instance, "supervisor", plan.chain.queue_parts)?;
+        let node = Node::join(instance, "supervisor", plan.chain.queue_parts())?;
         let services = Services::create(&node, plan)?;
         let count = plan.stages().count();
         let stages =
@@ -117,7 +120,9 @@ impl<'a> Watch<'a> {
             started_ns: now_ns,
             next_sample_ns: now_ns + SAMPLE_NS,
             usage: Usage::default(),
-            progress: Progress::new(now_ns, plan.sweeps),
+            progress: Progress::new(now_ns, plan),
+            ladder: Ladder::new(plan.chain.overload.clone()),
+            overload: OverloadReport::default(),
             begun: false,
             stop_asked: false,
             failed: None,
@@ -230,6 +235,7 @@ impl<'a> Watch<'a> {
             }
             self.name_losses(position);
         }
+        self.climb();
         let now_ns = clock::now_ns();
         if now_ns >= self.next_sample_ns {
             self.next_sample_ns = now_ns + SAMPLE_NS;
@@ -281,6 +287,20 @@ impl<'a> Watch<'a> {
         }
     }
 
+    /// Tells the source how much of its work the chain is to leave out.
+    fn climb(&mut self) {
+        if self.plan.pace == Pace::Fast {
+            return;
+        }
+        let source = &self.stages[0].page;
+        let sweeps = source.published.get() / u64::from(self.plan.chain.sectors.max(1));
+        let trouble = Trouble::of(self.stages.iter().map(|stage| &*stage.page));
+        let Some(step) = self.ladder.look(sweeps, trouble) else { return };
+        source.step.set(self.ladder.step() as u64);
+        tracing::warn!(sweep = step.sweep, from = step.from, to = step.to, reason = step.reason, "overload");
+        self.overload.note(step);
+    }
+
     pub(crate) fn sample(&mut self) {
         let settled = clock::now_ns() - self.started_ns >= SETTLE_NS
             && self.stages[0].page.published.get() >= SETTLE_SWEEPS * u64::from(self.plan.chain.sectors);
@@ -292,7 +312,17 @@ impl<'a> Watch<'a> {
         self.usage.update(std::process::id(), settled);
     }
 
+    fn overload_report(&mut self) -> OverloadReport {
+        let mut report = std::mem::take(&mut self.overload);
+        for stage in &self.stages {
+            report.overruns.insert(stage.name.clone(), stage.page.overruns.get());
+            report.slips.insert(stage.name.clone(), stage.page.slips.get());
+        }
+        report
+    }
+
     fn report(mut self) -> Report {
+        let overload = self.overload_report();
         let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
         self.usage.update(std::process::id(), true);
         let pages: Vec<(&str, &Page)> = self.stages.iter().map(|stage| (stage.name.as_str(), &*stage.page)).collect();
@@ -306,6 +336,7 @@ impl<'a> Watch<'a> {
             published: self.stages[0].page.published.get(),
             duration_s,
             processes,
+            overload,
             stopped: self.failed.clone(),
         })
     }

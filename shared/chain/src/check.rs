@@ -1,24 +1,31 @@
 use messages::MAX_HOPS;
 use serde::{Deserialize, Serialize};
 
+use crate::overload::Overload;
 use crate::{ChainFile, SourceFile};
 
 /// What the source writes.
 const SWEEP: &str = "Sweep";
 /// What the simulator writes beside it, for the ground alone.
 const TRUTH: &str = "Truth";
-/// Most sectors of a sweep: the source sends whole sweeps so far.
-const MAX_SECTORS: u32 = 1;
+/// Most sectors of a sweep. At 10 Hz a sector of 360 takes 0.3 ms, which is about what a hop through three stages costs.
+const MAX_SECTORS: u32 = 360;
+/// Most parts that may wait for a reader: each is a place for the largest message in (sparse) shared memory.
+const MAX_QUEUE_PARTS: usize = 1_440;
 
 /// A checked chain.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Chain {
     /// Sectors that a sweep travels as.
     pub sectors: u32,
-    /// Messages that wait for a slow reader before the oldest is dropped.
-    pub queue_parts: usize,
+    /// Sweeps that wait for a slow reader before the oldest part is dropped.
+    pub queue_sweeps: usize,
     /// From the last return of a sweep to its last detection [ms].
     pub deadline_ms: f64,
+    /// Age of a part after its last return at which nobody may act on it any more [ms].
+    pub allowed_age_ms: f64,
+    /// What is left out under overload.
+    pub overload: Overload,
     /// How often a stage may be restarted.
     pub restart_budget: RestartBudget,
     /// The default source: a path relative to chain.toml.
@@ -40,6 +47,8 @@ pub struct Wired {
     pub writes: Option<String>,
     /// Its parameters, relative to chain.toml.
     pub parameters: Option<String>,
+    /// Time that it may be busy with a sweep [ms]; none for the sink, which the chain does not wait for.
+    pub budget_ms: Option<f64>,
 }
 
 /// Restarts allowed to each stage within a sliding window.
@@ -68,6 +77,33 @@ pub enum ChainError {
         /// What it must be.
         expected: &'static str,
     },
+    /// Budgets that leave no time for the way between the stages.
+    #[error("the budgets add up to {sum_ms} ms, must be at most deadline_ms = {deadline_ms}")]
+    Budgets {
+        /// Their sum [ms].
+        sum_ms: f64,
+        /// The deadline [ms].
+        deadline_ms: f64,
+    },
+    /// An answer in time that nobody may act on.
+    #[error("deadline_ms is {deadline_ms}, must be at most allowed_age_ms = {allowed_age_ms}")]
+    Age {
+        /// The deadline [ms].
+        deadline_ms: f64,
+        /// The allowed age [ms].
+        allowed_age_ms: f64,
+    },
+    /// A stage that is waited for and may take for ever.
+    #[error("stage {0:?} has no budget_ms, must have one: only the last stage has none")]
+    NoBudget(String),
+    /// A step of overload that there is none of.
+    #[error(
+        "overload.steps names {0:?}, must name \"fewer-starts\", \"paper-features\", \"clusters-only\" or \"every-second-sweep\""
+    )]
+    Step(String),
+    /// Steps of overload out of order.
+    #[error("overload.steps has {0:?} after a later step, must go from the gentlest to the last, each once")]
+    StepOrder(String),
     /// Too few or too many stages for a chain.
     #[error("[[stage]] stands {0} times, must stand 1 to {max} times", max = MAX_HOPS - 1)]
     Length(usize),
@@ -109,20 +145,27 @@ impl ChainFile {
 
     /// The chain that the file describes.
     pub fn checked(self) -> Result<Chain, ChainError> {
-        let sectors = f64::from(self.sectors);
+        number("sectors", f64::from(self.sectors), "1 to 360", (1..=MAX_SECTORS).contains(&self.sectors))?;
+        let queue_parts = self.queue_sweeps.saturating_mul(self.sectors as usize);
         number(
-            "sectors",
-            sectors,
-            "1 (whole sweeps: more are not built yet)",
-            (1..=MAX_SECTORS).contains(&self.sectors),
+            "queue_sweeps",
+            self.queue_sweeps as f64,
+            "2 to 256, and at most 1440 parts in all",
+            (2..=256).contains(&self.queue_sweeps) && queue_parts <= MAX_QUEUE_PARTS,
         )?;
-        number("queue_parts", self.queue_parts as f64, "2 to 256", (2..=256).contains(&self.queue_parts))?;
         number(
             "deadline_ms",
             self.deadline_ms,
             "within (0, 60000]",
             self.deadline_ms > 0.0 && self.deadline_ms <= 6e4,
         )?;
+        number(
+            "allowed_age_ms",
+            self.allowed_age_ms,
+            "within (0, 3600000]",
+            self.allowed_age_ms > 0.0 && self.allowed_age_ms <= 3.6e6,
+        )?;
+        self.check_times()?;
         number("restarts", f64::from(self.restarts), "at most 1000", self.restarts <= 1_000)?;
         let window = self.restart_window_s;
         number("restart_window_s", window, "within (0, 86400]", window > 0.0 && window <= 86_400.0)?;
@@ -131,8 +174,10 @@ impl ChainFile {
         let SourceFile { from: default_source, sweeps: default_sweeps } = self.source;
         Ok(Chain {
             sectors: self.sectors,
-            queue_parts: self.queue_parts,
+            queue_sweeps: self.queue_sweeps,
             deadline_ms: self.deadline_ms,
+            allowed_age_ms: self.allowed_age_ms,
+            overload: self.overload.checked()?,
             restart_budget: RestartBudget { restarts: self.restarts, window_s: self.restart_window_s },
             default_source,
             default_sweeps,
@@ -144,9 +189,38 @@ impl ChainFile {
                     reads: stage.reads,
                     writes: stage.writes,
                     parameters: stage.parameters,
+                    budget_ms: stage.budget_ms,
                 })
                 .collect(),
         })
+    }
+
+    /// Budgets add up, and an answer in time is young enough to act on.
+    fn check_times(&self) -> Result<(), ChainError> {
+        let Self { deadline_ms, allowed_age_ms, .. } = *self;
+        if deadline_ms > allowed_age_ms {
+            return Err(ChainError::Age { deadline_ms, allowed_age_ms });
+        }
+        let mut sum_ms = 0.0;
+        for (place, stage) in self.stages.iter().enumerate() {
+            let last = place + 1 == self.stages.len();
+            let Some(budget_ms) = stage.budget_ms else {
+                if last {
+                    continue;
+                }
+                return Err(ChainError::NoBudget(stage.name.clone()));
+            };
+            number("stage.budget_ms", budget_ms, "within (0, 60000]", budget_ms > 0.0 && budget_ms <= 6e4)?;
+            if last {
+                return Err(ends(
+                    stage.name.clone(),
+                    "has a budget_ms",
+                    "have none, because the chain does not wait for it",
+                ));
+            }
+            sum_ms += budget_ms;
+        }
+        if sum_ms > deadline_ms { Err(ChainError::Budgets { sum_ms, deadline_ms }) } else { Ok(()) }
     }
 
     fn check_wires(&self) -> Result<(), ChainError> {
@@ -183,13 +257,18 @@ impl ChainFile {
 }
 
 impl Chain {
+    /// Parts that wait for a slow reader before the oldest is dropped.
+    pub fn queue_parts(&self) -> usize {
+        self.queue_sweeps * self.sectors.max(1) as usize
+    }
+
     /// Name of the sink.
     pub fn sink(&self) -> &str {
         self.stages.last().map_or("", |sink| &sink.name)
     }
 }
 
-fn number(key: &'static str, value: f64, expected: &'static str, holds: bool) -> Result<(), ChainError> {
+pub(crate) fn number(key: &'static str, value: f64, expected: &'static str, holds: bool) -> Result<(), ChainError> {
     if holds { Ok(()) } else { Err(ChainError::Number { key, value, expected }) }
 }
 
@@ -229,8 +308,11 @@ mod tests {
 
     #[test]
     fn each_number_out_of_bounds_is_refused_by_key() {
-        assert!(refused("sectors = 1", "sectors = 0").contains("sectors is 0, must be 1"));
-        assert!(refused("queue_parts = 4", "queue_parts = 1").contains("queue_parts is 1"));
+        assert!(refused("sectors = 36", "sectors = 0").contains("sectors is 0, must be 1"));
+        assert!(refused("sectors = 36", "sectors = 361").contains("sectors is 361"));
+        assert!(refused("queue_sweeps = 4", "queue_sweeps = 1").contains("queue_sweeps is 1"));
+        assert!(refused("queue_sweeps = 4", "queue_sweeps = 41").contains("at most 1440 parts"));
+        assert!(refused("allowed_age_ms = 1000.0", "allowed_age_ms = 0.0").contains("allowed_age_ms is 0"));
         assert!(refused("deadline_ms = 100.0", "deadline_ms = nan").contains("deadline_ms is NaN"));
         assert!(refused("restarts = 10", "restarts = 1001").contains("restarts is 1001"));
         assert!(refused("restart_window_s = 60.0", "restart_window_s = 0.0").contains("restart_window_s is 0"));
@@ -239,6 +321,25 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_refused_with_its_line() {
-        assert!(refused("sectors = 1", "sektors = 1").contains("unknown field `sektors`"));
+        assert!(refused("sectors = 36", "sektors = 36").contains("unknown field `sektors`"));
+    }
+
+    #[test]
+    fn budgets_fit_into_the_deadline_and_the_deadline_into_the_allowed_age() {
+        assert!(refused("budget_ms = 60.0", "budget_ms = 96.0").contains("the budgets add up to"));
+        assert!(refused("budget_ms = 60.0", "budget_ms = 0.0").contains("stage.budget_ms is 0"));
+        assert!(refused("budget_ms = 60.0", "").contains(r#"stage "extractor" has no budget_ms"#));
+        assert!(
+            refused(r#"reads = "Detections""#, "reads = \"Detections\"\nbudget_ms = 1.0").contains("has a budget_ms")
+        );
+        assert!(refused("allowed_age_ms = 1000.0", "allowed_age_ms = 99.0").contains("at most allowed_age_ms = 99"));
+    }
+
+    #[test]
+    fn the_ladder_has_known_steps_in_order() {
+        assert!(refused(r#""clusters-only""#, r#""nominal""#).contains(r#"overload.steps names "nominal""#));
+        assert!(refused(r#""clusters-only""#, r#""fewer-starts""#).contains("after a later step"));
+        assert!(refused("troubled_sweeps = 3", "troubled_sweeps = 11").contains("troubled_sweeps is 11, must be 1 to"));
+        assert!(refused("recover_sweeps = 50", "recover_sweeps = 0").contains("recover_sweeps is 0"));
     }
 }

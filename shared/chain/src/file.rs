@@ -6,14 +6,18 @@ use serde::{Deserialize, Serialize};
 pub struct ChainFile {
     /// Sectors that a sweep travels as; 1 = whole sweeps.
     pub sectors: u32,
-    /// Messages that wait for a slow reader before the oldest is dropped.
-    pub queue_parts: usize,
+    /// Sweeps that wait for a slow reader before the oldest part is dropped.
+    pub queue_sweeps: usize,
     /// From the last return of a sweep to its last detection [ms].
     pub deadline_ms: f64,
+    /// Age of a part after its last return at which nobody may act on it any more [ms].
+    pub allowed_age_ms: f64,
     /// Restarts that a stage may have within `restart_window_s`; one more and the chain stops.
     pub restarts: u32,
     /// Length of that window [s].
     pub restart_window_s: f64,
+    /// What is left out under overload.
+    pub overload: OverloadFile,
     /// Where sweeps come from when `--from` says nothing else.
     pub source: SourceFile,
     /// The stages in flow order; the last is the sink.
@@ -43,4 +47,20 @@ pub struct StageFile {
     pub writes: Option<String>,
     /// Its parameters, relative to chain.toml; none where it has none.
     pub parameters: Option<String>,
+    /// Time that it may be busy with a sweep [ms]; none for the sink, which the chain does not wait for.
+    pub budget_ms: Option<f64>,
+}
+
+/// The ladder of overload as written.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverloadFile {
+    /// Names of the steps that are taken, gentlest first; empty: overruns are only counted.
+    pub steps: Vec<String>,
+    /// Sweeps in trouble, of the last `within_sweeps`, after which a step is taken.
+    pub troubled_sweeps: u32,
+    /// Sweeps looked back on.
+    pub within_sweeps: u32,
+    /// Sweeps without trouble after which a step is taken back.
+    pub recover_sweeps: u32,
 }

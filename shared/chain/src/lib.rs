@@ -5,6 +5,8 @@
 
 mod check;
 mod file;
+mod overload;
 
 pub use check::{Chain, ChainError, RestartBudget, Wired};
-pub use file::{ChainFile, SourceFile, StageFile};
+pub use file::{ChainFile, OverloadFile, SourceFile, StageFile};
+pub use overload::Overload;

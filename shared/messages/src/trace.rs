@@ -113,7 +113,7 @@ pub struct Hop {
     pub free_ns: u64,
     /// When the input was taken from shared memory; for the source, when it began to make the part.
     pub received_ns: u64,
-    /// When `process` began.
+    /// When `process` began; for the source, when it had made the part and waited for its time.
     pub started_ns: u64,
     /// When `process` had ended, just before the output was sent.
     pub finished_ns: u64,

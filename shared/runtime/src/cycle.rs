@@ -1,7 +1,8 @@
-use messages::{Hop, Trace};
+use messages::{Hop, Trace, Verdict};
 use stage::Stage;
 use transport::{Outlet, Taken};
 
+use crate::deadline::Deadline;
 use crate::reader::{Arrivals, Reader, serve};
 use crate::shell::WARM_UP_PARTS;
 use crate::{Shell, ShellError, clock};
@@ -13,7 +14,7 @@ pub fn run_stage<S: Stage>(stage: S, shell: &Shell) -> Result<(), ShellError> {
     let outlet = node.outlet::<S::Output>()?;
     let inlet = node.inlet::<S::Input>()?;
     shell.running();
-    serve(shell, &inlet, &mut Cycle { stage, shell, outlet, arrivals: Arrivals::new(shell) })?;
+    serve(shell, &inlet, &mut Cycle::new(stage, shell, outlet))?;
     shell.left();
     Ok(())
 }
@@ -23,12 +24,19 @@ struct Cycle<'a, S: Stage> {
     shell: &'a Shell,
     outlet: Outlet<S::Output>,
     arrivals: Arrivals<'a>,
+    deadline: Deadline,
+}
+
+impl<'a, S: Stage> Cycle<'a, S> {
+    fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>) -> Self {
+        Self { stage, shell, outlet, arrivals: Arrivals::new(shell), deadline: Deadline::of(&shell.plan, &shell.name) }
+    }
 }
 
 impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
     /// One part: receive → in hand → process → send → published → counted → out of hand → release.
     fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
-        let Self { stage, shell, outlet, arrivals } = self;
+        let Self { stage, shell, outlet, arrivals, deadline } = self;
         let page = &shell.page;
         let received_ns = clock::now_ns();
         let mut trace: Trace = *taken.trace();
@@ -40,13 +48,17 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         let mut loan = outlet.loan()?;
         let started_ns = clock::now_ns();
         let before_process = (shell.allocations)();
-        let verdict = stage.process(trace.part, taken.message(), loan.message_mut());
+        let verdict = if deadline.is_stale(&trace, started_ns) {
+            Verdict::RejectedStale
+        } else {
+            stage.process(trace.part, taken.message(), loan.message_mut())
+        };
         let in_process = (shell.allocations)() - before_process;
         shell.slow_down();
         let finished_ns = clock::now_ns();
 
         page.note_verdict(verdict);
-        trace.push(Hop {
+        let hop = Hop {
             sequence: page.published.get(),
             free_ns: arrivals.free_ns,
             received_ns,
@@ -58,7 +70,9 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             stage: shell.position,
             verdict,
             reserved: 0,
-        });
+        };
+        deadline.judge(page, &shell.name, &trace, &hop);
+        trace.push(hop);
         *loan.trace_mut() = trace;
         loan.send()?;
         page.count_sent(trace.part);

@@ -26,6 +26,9 @@ pub enum ShellError {
         /// What is wrong with it.
         cause: String,
     },
+    /// The system has no memory for what a process needs at its start.
+    #[error("no memory for {0}; free some, or run fewer chains")]
+    Memory(&'static str),
     /// Shared memory failed.
     #[error(transparent)]
     Transport(#[from] transport::TransportError),

@@ -6,6 +6,7 @@
 
 pub mod clock;
 mod cycle;
+mod deadline;
 mod error;
 pub mod logging;
 mod pacer;
@@ -16,6 +17,7 @@ mod shell;
 mod shutdown;
 mod sink;
 mod source;
+mod throttle;
 mod window;
 
 pub use cycle::run_stage;

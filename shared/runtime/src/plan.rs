@@ -115,7 +115,7 @@ impl Plan {
 
     /// Parts that may be in flight at [`Pace::Fast`]. Half a queue: after a death up to twice as many may be.
     pub fn window_parts(&self) -> u64 {
-        (self.chain.queue_parts as u64 / 2).max(1)
+        (self.chain.queue_parts() as u64 / 2).max(1)
     }
 }
 

@@ -80,7 +80,7 @@ impl Shell {
     }
 
     pub(crate) fn join(&self) -> Result<Node, ShellError> {
-        Ok(Node::join(&self.instance, &self.name, self.plan.chain.queue_parts)?)
+        Ok(Node::join(&self.instance, &self.name, self.plan.chain.queue_parts())?)
     }
 
     pub(crate) fn running(&self) {

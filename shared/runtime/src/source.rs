@@ -1,6 +1,7 @@
-use messages::{Hop, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
+use messages::{Cutter, Hop, Message, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
 use stage::{Next, Source};
 use transport::{Loan, Outlet};
+use zerocopy::FromZeros;
 
 use crate::pacer::Pacer;
 use crate::page::State;
@@ -16,34 +17,32 @@ const LOOK_NS: u64 = 20_000_000;
 /// what it has sent lives in its shared memory.
 pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellError> {
     let node = shell.join()?;
-    let mut out = Out {
-        shell,
-        sweeps: node.outlet()?,
-        truths: node.outlet()?,
-        pacer: Pacer::default(),
-        free_ns: clock::now_ns(),
-    };
-    let window = Window::open(shell)?;
+    let (sweeps, truths) = (node.outlet()?, node.outlet()?);
+    let mut out = Out::new(shell, &sweeps)?;
     shell.running();
     // Nothing is sent before everybody listens.
     wait_while(shell, LOOK_NS, || shell.page.may_start.get() == 0);
 
-    // A successor goes on where its predecessor stopped.
+    // A successor goes on where its predecessor stopped, in the middle of a sweep if need be.
+    let sectors = u64::from(shell.plan.chain.sectors.max(1));
     let mut ordinal = shell.page.next_ordinal_out.get();
-    if ordinal > 0 {
-        let (mut sweep, mut truth) = (out.sweeps.loan()?, out.truths.loan()?);
-        source.skip(ordinal, sweep.message_mut(), truth.message_mut())?;
+    if ordinal >= sectors {
+        source.skip(ordinal / sectors, &mut out.whole, truths.loan()?.message_mut())?;
     }
-    while shell.plan.sweeps.is_none_or(|sweeps| ordinal < sweeps) {
-        match shell.plan.pace {
-            Pace::Fast => wait_while(shell, WINDOW_LOOK_NS, || !window.has_room(shell.page.published.get())),
-            // The stages first: whoever makes the next sweep at once keeps the core from the one it has just woken.
-            Pace::Realtime => out.wait_until(out.pacer.quiet_until_ns()),
-        }
-        if shell.leaving() || !out.make_and_send(&mut source, ordinal)? {
+    while !shell.leaving() && shell.plan.sweeps.is_none_or(|sweeps| ordinal / sectors < sweeps) {
+        let mut truth = truths.loan()?;
+        if !out.make(&mut source, truth.message_mut())? {
             break;
         }
-        ordinal += 1;
+        let end = (ordinal / sectors + 1) * sectors;
+        while ordinal < end && out.send(ordinal)? {
+            ordinal += 1;
+        }
+        if ordinal < end {
+            break;
+        }
+        *truth.trace_mut() = out.trace;
+        truth.send()?;
     }
     shell.page.set_state(State::Ended);
     wait_while(shell, LOOK_NS, || true);
@@ -59,34 +58,76 @@ fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
     }
 }
 
-/// The way out of the source.
+/// The way out of the source: a sweep is made as a whole and leaves in sectors, each when the sensor would have it.
 struct Out<'a> {
     shell: &'a Shell,
-    sweeps: Outlet<Sweep>,
-    truths: Outlet<Truth>,
+    sweeps: &'a Outlet<Sweep>,
+    window: Window,
     pacer: Pacer,
+    cutter: Cutter,
+    whole: Box<Sweep>,
+    /// Host time at which the sweep's first firing is due [ns].
+    start_ns: u64,
+    began_ns: u64,
+    step: u32,
+    trace: Trace,
     free_ns: u64,
 }
 
-impl Out<'_> {
-    /// One part: in hand → made → due → sent → published → out of hand. False at the end of the data, or when asked to
-    /// leave before the part was due.
-    fn make_and_send<S: Source>(&mut self, source: &mut S, ordinal: u64) -> Result<bool, ShellError> {
-        let shell = self.shell;
-        let received_ns = clock::now_ns();
-        shell.page.make_in_hand(ordinal);
-        let (mut sweep, mut truth) = (self.sweeps.loan()?, self.truths.loan()?);
-        let started_ns = clock::now_ns();
-        let next = source.next(sweep.message_mut(), truth.message_mut())?;
-        shell.slow_down();
-        let header = sweep.message_mut().header;
-        if next == Next::End || self.is_over(&header) {
-            shell.page.put_down();
+impl<'a> Out<'a> {
+    fn new(shell: &'a Shell, sweeps: &'a Outlet<Sweep>) -> Result<Self, ShellError> {
+        Ok(Self {
+            shell,
+            sweeps,
+            window: Window::open(shell)?,
+            pacer: Pacer::default(),
+            cutter: Cutter::new(shell.plan.chain.sectors),
+            whole: Sweep::new_box_zeroed().map_err(|_| ShellError::Memory("a sweep"))?,
+            start_ns: 0,
+            began_ns: 0,
+            step: 0,
+            trace: Trace::default(),
+            free_ns: clock::now_ns(),
+        })
+    }
+
+    /// Makes the next sweep. False at the end of the data.
+    fn make<S: Source>(&mut self, source: &mut S, truth: &mut Truth) -> Result<bool, ShellError> {
+        let began_ns = clock::now_ns();
+        self.whole.clear();
+        let next = source.next(&mut self.whole, truth)?;
+        self.shell.slow_down();
+        if next == Next::End || self.is_over(&self.whole.header) {
             return Ok(false);
         }
+        self.cutter.measure(&mut self.whole);
+        self.start_ns = self.pacer.start_ns(self.whole.header.sensor_time_ns, began_ns);
+        self.began_ns = began_ns;
+        // One step for the whole sweep. At --pace fast results do not depend on how busy the machine is.
+        self.step = if self.shell.plan.pace == Pace::Realtime { self.shell.page.step.get() as u32 } else { 0 };
+        Ok(true)
+    }
+
+    /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before.
+    fn send(&mut self, ordinal: u64) -> Result<bool, ShellError> {
+        let shell = self.shell;
+        let sectors = shell.plan.chain.sectors.max(1);
+        let sector = (ordinal % u64::from(sectors)) as u32;
+        if shell.plan.pace == Pace::Fast {
+            wait_while(shell, WINDOW_LOOK_NS, || !self.window.has_room(shell.page.published.get()));
+        }
+        if shell.leaving() {
+            return Ok(false);
+        }
+        // A sweep's first part had to wait for the sweep to be made.
+        let received_ns = if sector == 0 { self.began_ns } else { clock::now_ns() };
+        shell.page.make_in_hand(ordinal);
+        let mut loan = self.sweeps.loan()?;
+        self.cutter.fill(&self.whole, sector, loan.message_mut());
+        let started_ns = clock::now_ns();
         let due_ns = match shell.plan.pace {
             Pace::Fast => clock::now_ns(),
-            Pace::Realtime => self.pacer.due_ns(header.sensor_time_ns, header.period_ns, received_ns),
+            Pace::Realtime => self.start_ns + self.cutter.end_offset_ns(&self.whole, sector),
         };
         self.wait_until(due_ns);
         if clock::now_ns() < due_ns {
@@ -99,17 +140,16 @@ impl Out<'_> {
         }
         let part = Part {
             ordinal,
-            sweep: ordinal,
-            sector: 0,
-            sectors: 1,
-            sensor_time_ns: header.sensor_time_ns,
-            step: 0,
+            sweep: ordinal / u64::from(sectors),
+            sector,
+            sectors,
+            sensor_time_ns: self.whole.header.sensor_time_ns,
+            step: self.step,
             reserved: 0,
         };
-        let mut trace = Trace { part, due_ns, ..Trace::default() };
-        trace.push(self.hop(received_ns, started_ns));
-        send(shell, sweep, truth, trace)?;
-        self.free_ns = clock::now_ns();
+        self.trace = Trace { part, due_ns, sweep_start_ns: self.start_ns, ..Trace::default() };
+        self.trace.push(self.hop(received_ns, started_ns));
+        self.publish(loan)?;
         Ok(true)
     }
 
@@ -127,6 +167,17 @@ impl Out<'_> {
             verdict: Verdict::Complete,
             reserved: 0,
         }
+    }
+
+    fn publish(&mut self, mut loan: Loan<'_, Sweep>) -> Result<(), ShellError> {
+        *loan.trace_mut() = self.trace;
+        loan.send()?;
+        let page = &self.shell.page;
+        page.count_sent(self.trace.part);
+        page.put_down();
+        self.free_ns = clock::now_ns();
+        page.beat(self.free_ns);
+        Ok(())
     }
 
     /// Whether the sweep ends after the sensor time that was asked for; the first sweep of the run begins it, whichever
@@ -148,15 +199,4 @@ impl Out<'_> {
             clock::sleep_until_ns(until_ns.min(clock::now_ns() + LOOK_NS));
         }
     }
-}
-
-fn send(shell: &Shell, mut sweep: Loan<'_, Sweep>, mut truth: Loan<'_, Truth>, trace: Trace) -> Result<(), ShellError> {
-    *sweep.trace_mut() = trace;
-    *truth.trace_mut() = trace;
-    truth.send()?;
-    sweep.send()?;
-    shell.page.count_sent(trace.part);
-    shell.page.put_down();
-    shell.page.beat(clock::now_ns());
-    Ok(())
 }

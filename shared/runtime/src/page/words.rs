@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use messages::Verdict;
 
 /// Told apart from any other file, and from pages of another layout.
-pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg1");
+pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg2");
 
 /// Gaps whose ordinals are kept by name; older ones are overwritten, their counts stay.
 pub(super) const MAX_GAPS: usize = 128;
@@ -127,6 +127,12 @@ pub struct Page {
     pub(super) lost_unsettled: Word,
     /// The stage before has been drained up to this of its lives.
     pub drained_incarnation: Word,
+    /// Sweeps on which the stage was busy for longer than its budget.
+    pub overruns: Word,
+    /// Parts that were waiting already when the stage had finished the part before.
+    pub slips: Word,
+    /// Sweeps whose last part left the stage after the deadline.
+    pub late: Word,
     /// Heap allocations inside `process` after warm-up.
     pub process_allocations: Word,
     /// Heap allocations of the shell round it after warm-up.
@@ -149,6 +155,8 @@ pub struct Page {
     pub lose_below: Word,
     /// Source only: 1 once all readers are connected.
     pub may_start: Word,
+    /// Source only: number of the step of degradation at which the next sweep is to be processed.
+    pub step: Word,
 
     // Written by `encke inject`.
     /// Parts still to swallow.
