@@ -84,20 +84,37 @@ fn classifier(plan: &Plan, assets: &Assets) -> Result<Classifier, Failure> {
 
 /// Reads the files of the model that the parameters name.
 pub(crate) fn add_model(plan: &Plan, assets: &Assets, params: &mut classifier::Params) -> Result<(), Failure> {
-    let folder = format!("models/{}", params.model);
-    let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
-    let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
-    fits_extractor(plan, &parsed, &params.model)?;
-    let model = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
-    params.files = Some(ModelFiles { card, model });
+    let found = extractor_params(plan);
+    params.files = Some(model_files(assets, &params.model, found.as_ref())?);
+    if let Some(overload) = &mut params.overload {
+        let found = found.map(|found| extractor::Params {
+            solids: false,
+            histogram: found.histogram || found.overload.histogram,
+            ..found
+        });
+        overload.files = Some(model_files(assets, &overload.model, found.as_ref())?);
+    }
     Ok(())
 }
 
+/// The extractor's parameters; none where they do not hold, of which the extractor itself says what is wrong.
+fn extractor_params(plan: &Plan) -> Option<extractor::Params> {
+    toml::from_str(plan.parameters.get(Extractor::NAME)?).ok()
+}
+
+/// The files of a model that judges what an extractor of parameters `found` describes.
+fn model_files(assets: &Assets, model: &str, found: Option<&extractor::Params>) -> Result<ModelFiles, Failure> {
+    let folder = format!("models/{model}");
+    let card = assets.text(&format!("{folder}/card.toml")).map_err(Failure::start)?;
+    let parsed = Card::parse(&card).map_err(|cause| Failure::start(format!("{folder}/card.toml: {cause}")))?;
+    fits_extractor(found, &parsed, model)?;
+    let bytes = assets.bytes(&format!("{folder}/{}", parsed.file)).map_err(Failure::start)?.into_owned();
+    Ok(ModelFiles { card, model: bytes })
+}
+
 /// A model judges only what the extractor that it was trained with describes.
-fn fits_extractor(plan: &Plan, card: &Card, model: &str) -> Result<(), Failure> {
-    let text = plan.parameters.get(Extractor::NAME).map_or("", String::as_str);
-    // The extractor itself says what is wrong with its file.
-    let Ok(found) = toml::from_str::<extractor::Params>(text) else { return Ok(()) };
+fn fits_extractor(found: Option<&extractor::Params>, card: &Card, model: &str) -> Result<(), Failure> {
+    let Some(found) = found else { return Ok(()) };
     let refused = |trained: String, has: String| {
         let remedy = "train anew, or set them back in stages/extractor.toml";
         Err(Failure::start(format!("model {model:?} was trained with {trained}; the extractor has {has}: {remedy}")))

@@ -40,7 +40,7 @@ pub use coupling::{couple, pairwise_probability};
 pub use model::{Judgement, Model, ModelError, SolidSvm, SolidTrees};
 pub use naive_bayes::{NaiveBayes, NaiveBayesError};
 pub use naive_bayes_file::NaiveBayesFileError;
-pub use params::{Method, ModelFiles, Params};
+pub use params::{Method, ModelFiles, OverloadParams, Params};
 pub use room::{Classifier, ClassifierError};
 pub use solid_features::{SOLID_FEATURES, misfit, solid_feature_names, solid_features};
 pub use svm::{Decision, MAX_CLASSES, PAIRS, Svm};

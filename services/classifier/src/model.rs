@@ -121,6 +121,11 @@ impl Model {
         }
     }
 
+    /// Whether it judges histograms, not solids.
+    pub(crate) fn judges_histograms(&self) -> bool {
+        !matches!(self, Self::BoostedTrees(_))
+    }
+
     fn from_svm(file: String, svm: Svm) -> Result<Self, ModelError> {
         let solid_of = |place: usize| {
             let label = svm.labels().get(place).copied().unwrap_or(0);

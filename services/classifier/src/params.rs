@@ -10,7 +10,22 @@ pub struct Params {
     pub model: String,
     /// A class less likely than this is not claimed: the cluster stays unclassified \[0 to 1\].
     pub least_posterior: f32,
+    /// What judges when no solids are fitted for overload; without it clusters then stay unclassified.
+    pub overload: Option<OverloadParams>,
     /// The model's files; not in the TOML file. The shell fills them in before the stage starts.
+    #[serde(skip)]
+    pub files: Option<ModelFiles>,
+}
+
+/// `[overload]` of `config/stages/classifier.toml`, as written, and its model.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverloadParams {
+    /// Which classifier judges histograms at the step "paper-features".
+    pub method: Method,
+    /// Name of its model.
+    pub model: String,
+    /// As above.
     #[serde(skip)]
     pub files: Option<ModelFiles>,
 }
@@ -54,9 +69,16 @@ mod tests {
     #[test]
     fn the_shipped_file_names_a_method_and_a_model() {
         let params: Params = toml::from_str(include_str!("../../../config/stages/classifier.toml")).unwrap();
+        let overload = OverloadParams { method: Method::Svm, model: "paper-svm".to_owned(), files: None };
         assert_eq!(
             params,
-            Params { method: Method::BoostedTrees, model: "solids".to_owned(), least_posterior: 0.0, files: None }
+            Params {
+                method: Method::BoostedTrees,
+                model: "solids".to_owned(),
+                least_posterior: 0.0,
+                overload: Some(overload),
+                files: None
+            }
         );
     }
 

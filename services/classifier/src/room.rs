@@ -1,12 +1,14 @@
-use messages::{Descriptors, Detection, Detections, Part, Verdict};
+use messages::{Descriptors, Detection, Detections, Part, Step, Verdict};
 use stage::{InitError, Stage};
 
-use crate::{BINS, Judgement, Model, ModelError, Params};
+use crate::{BINS, Judgement, Method, Model, ModelError, ModelFiles, Params};
 
 /// The stage: descriptors in, detections out.
 #[derive(Clone, Debug)]
 pub struct Classifier {
     model: Model,
+    /// Judges histograms where overload leaves no solids to judge.
+    standby: Option<Model>,
     least_posterior: f32,
 }
 
@@ -17,6 +19,9 @@ pub enum ClassifierError {
     /// The shell gave no model.
     #[error("files of model {0:?} were not given")]
     NoFiles(String),
+    /// Solids are just what there is none of then.
+    #[error("overload.method is boosted-trees, must be svm or naive-bayes: no solids are fitted under overload")]
+    Overload,
     /// No posterior is as likely, or none less.
     #[error("least_posterior is {0}, must be 0 to 1")]
     LeastPosterior(f32),
@@ -38,21 +43,22 @@ impl Stage for Classifier {
     type Output = Detections;
 
     fn init(params: Params) -> Result<Self, InitError> {
-        let name = params.model;
-        let Some(files) = params.files else {
-            return Err(InitError::new(ClassifierError::NoFiles(name)));
-        };
         let least_posterior = params.least_posterior;
         if !(0.0..=1.0).contains(&least_posterior) {
             return Err(InitError::new(ClassifierError::LeastPosterior(least_posterior)));
         }
-        match Model::load(params.method, &files) {
-            Ok(model) => Ok(Self { model, least_posterior }),
-            Err(cause) => Err(InitError::new(ClassifierError::Model { name, cause })),
-        }
+        let model = load(params.method, params.model, params.files).map_err(InitError::new)?;
+        let standby = match params.overload {
+            None => None,
+            Some(overload) if overload.method == Method::BoostedTrees => {
+                return Err(InitError::new(ClassifierError::Overload));
+            }
+            Some(overload) => Some(load(overload.method, overload.model, overload.files).map_err(InitError::new)?),
+        };
+        Ok(Self { model, standby, least_posterior })
     }
 
-    fn process(&mut self, _part: Part, input: &Descriptors, output: &mut Detections) -> Verdict {
+    fn process(&mut self, part: Part, input: &Descriptors, output: &mut Detections) -> Verdict {
         output.header = input.header;
         if !is_well_formed(input) || output.members.extend_from_slice(&input.members).is_err() {
             return Verdict::RejectedMalformed;
@@ -63,7 +69,14 @@ impl Stage for Classifier {
         }
         let detections = &mut output.detections;
         let least = self.least_posterior;
-        self.model.judge_all(input, |place, judgement| {
+        let model = match part.step() {
+            Step::Nominal | Step::FewerStarts => Some(&mut self.model),
+            Step::PaperFeatures if self.model.judges_histograms() => Some(&mut self.model),
+            Step::PaperFeatures => self.standby.as_mut(),
+            Step::ClustersOnly | Step::EverySecondSweep => None,
+        };
+        let Some(model) = model else { return Verdict::Complete };
+        model.judge_all(input, |place, judgement| {
             let claimed = judgement.class.solid_index().is_some_and(|class| judgement.posterior[class] >= least);
             let judgement = if claimed { judgement } else { Judgement::NONE };
             detections[place].class = judgement.class;
@@ -79,6 +92,11 @@ impl Stage for Classifier {
         }
         Verdict::Complete
     }
+}
+
+fn load(method: Method, name: String, files: Option<ModelFiles>) -> Result<Model, ClassifierError> {
+    let Some(files) = files else { return Err(ClassifierError::NoFiles(name)) };
+    Model::load(method, &files).map_err(|cause| ClassifierError::Model { name, cause })
 }
 
 /// Whether the descriptors part members, bins and fits among them, in order, and every bin and fit is one.

@@ -56,7 +56,13 @@ fn a_model_file_of_another_checksum_is_refused() {
 fn a_model_file_that_is_none_is_refused() {
     assert!(refusal(svm_params("nonsense")).contains("model.libsvm: line 1: nonsense is"));
     let files = ModelFiles { card: common::card_text("svm", "model.libsvm", &[0xff]), model: vec![0xff] };
-    let params = Params { method: Method::Svm, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) };
+    let params = Params {
+        method: Method::Svm,
+        model: "test".to_owned(),
+        least_posterior: 0.0,
+        overload: None,
+        files: Some(files),
+    };
     assert!(refusal(params).contains("model.libsvm is not UTF-8 text"));
 }
 

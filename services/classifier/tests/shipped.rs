@@ -23,8 +23,13 @@ fn each_shipped_model_is_accepted_by_its_method_alone() {
         let features = card.features.expect("a histogram");
         assert_eq!((card.file.as_str(), features.neighbours, features.spacing_deg), (file, 5, 0.72));
         assert_eq!(card.data["examples_of_each_class"].as_integer(), Some(2_000));
-        let params =
-            |method| Params { method, model: name.to_owned(), least_posterior: 0.0, files: Some(files.clone()) };
+        let params = |method| Params {
+            method,
+            model: name.to_owned(),
+            least_posterior: 0.0,
+            overload: None,
+            files: Some(files.clone()),
+        };
         assert!(Classifier::init(params(method)).is_ok());
         assert!(Classifier::init(params(other)).is_err());
     }
@@ -37,8 +42,13 @@ fn the_shipped_trees_are_accepted_and_reached_what_the_chain_promises() {
     let card = Card::parse(&files.card).expect("a card");
     assert!(card.scores["right_per_cent"].as_float().expect("a number") > 92.0);
     assert!(card.scores["false_alarm_per_cent"].as_float().expect("a number") <= 1.0);
-    let params =
-        Params { method: Method::BoostedTrees, model: "solids".to_owned(), least_posterior: 0.0, files: Some(files) };
+    let params = Params {
+        method: Method::BoostedTrees,
+        model: "solids".to_owned(),
+        least_posterior: 0.0,
+        overload: None,
+        files: Some(files),
+    };
     assert!(Classifier::init(params).is_ok());
 }
 

@@ -40,7 +40,7 @@ pub use features::Features;
 pub use histogram::{BINS, Histogram};
 pub use neighbours::{MAX_OTHERS, Neighbours};
 pub use normals::estimate_normals;
-pub use params::{CheckedParams, Params, ParamsError};
+pub use params::{CheckedParams, OverloadParams, Params, ParamsError};
 pub use relief::Relief;
 pub use room::Extractor;
 pub use stride::column_stride;

@@ -15,8 +15,20 @@ pub struct Params {
     pub histogram: bool,
     /// Whether solids are fitted to clusters: what the boosted trees judge.
     pub solids: bool,
+    /// What is made of clusters under overload.
+    pub overload: OverloadParams,
     /// How solids are fitted.
     pub fit: FitParams,
+}
+
+/// `[overload]` of `config/stages/extractor.toml`, as written.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverloadParams {
+    /// `fit.evaluations` at the step "fewer-starts", where it is the smaller of the two.
+    pub evaluations: u64,
+    /// Whether clusters get the paper's histogram at the step "paper-features", where no solids are fitted.
+    pub histogram: bool,
 }
 
 /// Parameters that hold.
@@ -30,6 +42,8 @@ pub struct CheckedParams {
     pub histogram: bool,
     /// How solids are fitted; none where they are not.
     pub fit: Option<FitSettings>,
+    /// What is made of clusters under overload.
+    pub overload: OverloadParams,
 }
 
 /// Why the extractor cannot start.
@@ -45,6 +59,9 @@ pub enum ParamsError {
     /// Nothing would be described.
     #[error("histogram and solids are both false, one must be true")]
     Nothing,
+    /// A budget under overload that is none.
+    #[error("overload.evaluations is {0}, must be 1 to 100000000")]
+    Overload(u64),
     /// The fit's parameters do not hold.
     #[error(transparent)]
     Fit(#[from] FitParamsError),
@@ -66,11 +83,15 @@ impl Params {
             return Err(ParamsError::Nothing);
         }
         let fit = self.fit.checked()?;
+        if !(1..=100_000_000).contains(&self.overload.evaluations) {
+            return Err(ParamsError::Overload(self.overload.evaluations));
+        }
         Ok(CheckedParams {
             others: self.neighbours as usize - 1,
             spacing_rad: self.spacing_deg.to_radians() as f32,
             histogram: self.histogram,
             fit: self.solids.then_some(fit),
+            overload: self.overload,
         })
     }
 }
@@ -85,11 +106,14 @@ mod tests {
         toml::from_str(FILE).unwrap()
     }
 
-    /// The shipped file with the value of one key changed.
+    /// The shipped file with the value of one key changed; a budget is changed in `[fit]`, and the one under overload is 1.
     fn with(key: &str, value: &str) -> Result<Params, toml::de::Error> {
         let is_key = |line: &&str| line.starts_with(&format!("{key} = "));
-        let line = FILE.lines().find(is_key).unwrap();
-        toml::from_str(&FILE.replacen(line, &format!("{key} = {value}"), 1))
+        let file = FILE.replacen(FILE.lines().find(|line| line.starts_with("evaluations = ")).unwrap(), "", 1);
+        let file = file.replacen("\n[overload]\n", "\n[overload]\nevaluations_ = 1\n", 1);
+        let line = file.lines().find(is_key).unwrap().to_owned();
+        let file = file.replacen(&line, &format!("{key} = {value}"), 1);
+        toml::from_str(&file.replacen("evaluations_", "evaluations", 1))
     }
 
     fn refused(key: &str, value: &str) -> String {
@@ -154,6 +178,19 @@ mod tests {
             for value in values {
                 assert!(with(key, value).unwrap().checked().is_ok(), "{key} = {value}");
             }
+        }
+    }
+
+    #[test]
+    fn a_budget_under_overload_that_is_none_is_refused() {
+        let with = |evaluations| {
+            let shipped = shipped();
+            Params { overload: OverloadParams { evaluations, ..shipped.overload }, ..shipped }.checked()
+        };
+        assert!(with(1).is_ok() && with(100_000_000).is_ok());
+        for evaluations in [0, 100_000_001] {
+            let message = format!("overload.evaluations is {evaluations}, must be 1 to 100000000");
+            assert_eq!(with(evaluations).unwrap_err().to_string(), message);
         }
     }
 

@@ -1,5 +1,5 @@
 use lidar::{MAX_COLUMNS, MAX_RETURNS, Return};
-use messages::{Cluster, Clusters, Descriptor, Descriptors, Fit, MAX_CELLS, MIN_FEATURE_POINTS, Part, Verdict};
+use messages::{Cluster, Clusters, Descriptor, Descriptors, Fit, MAX_CELLS, MIN_FEATURE_POINTS, Part, Step, Verdict};
 use stage::{InitError, Stage};
 
 use crate::fit::{Bundle, FitSettings, Fitter};
@@ -11,6 +11,10 @@ pub struct Extractor {
     spacing_rad: f32,
     features: Option<Features>,
     solids: Option<Solids>,
+    /// Whether clusters get histograms, by step.
+    histogram: [bool; Step::ALL.len()],
+    /// Residuals that may be evaluated for one cluster, by step; none where no solids are fitted.
+    evaluations: [Option<u64>; Step::ALL.len()],
 }
 
 /// What fits solids to clusters.
@@ -32,17 +36,29 @@ impl Stage for Extractor {
         let params = params.checked().map_err(InitError::new)?;
         Ok(Self {
             spacing_rad: params.spacing_rad,
-            features: params.histogram.then(|| Features::new(&params)),
+            features: (params.histogram || params.overload.histogram).then(|| Features::new(&params)),
             solids: params.fit.map(Solids::new),
+            histogram: Step::ALL.map(|step| match step {
+                Step::Nominal | Step::FewerStarts => params.histogram,
+                Step::PaperFeatures => params.histogram || params.overload.histogram,
+                Step::ClustersOnly | Step::EverySecondSweep => false,
+            }),
+            evaluations: Step::ALL.map(|step| match step {
+                Step::Nominal => params.fit.map(|fit| fit.evaluations),
+                Step::FewerStarts => params.fit.map(|fit| fit.evaluations.min(params.overload.evaluations)),
+                Step::PaperFeatures | Step::ClustersOnly | Step::EverySecondSweep => None,
+            }),
         })
     }
 
-    fn process(&mut self, _part: Part, input: &Clusters, output: &mut Descriptors) -> Verdict {
+    fn process(&mut self, part: Part, input: &Clusters, output: &mut Descriptors) -> Verdict {
         output.header = input.header;
         if !is_well_formed(input) || output.members.extend_from_slice(&input.members).is_err() {
             return Verdict::RejectedMalformed;
         }
         let stride = column_stride(&input.header, self.spacing_rad);
+        let step = part.step() as usize;
+        let (histogram, evaluations) = (self.histogram[step], self.evaluations[step]);
         let mut verdict = Verdict::Complete;
         for cluster in &input.clusters {
             let mut descriptor = Descriptor {
@@ -53,13 +69,14 @@ impl Stage for Extractor {
             };
             let returns = &input.returns[cluster.summary.member_places()];
             if returns.len() >= MIN_FEATURE_POINTS {
-                if let Some(features) = &mut self.features {
+                if let Some(features) = self.features.as_mut().filter(|_| histogram) {
                     for bin in features.describe(returns, stride).bins() {
                         // Cannot overflow: see `MAX_BINS`.
                         let _ = output.bins.push(bin);
                     }
                 }
-                let fit = self.solids.as_mut().and_then(|solids| solids.fit(input, cluster, returns));
+                let solids = self.solids.as_mut().zip(evaluations);
+                let fit = solids.and_then(|(solids, evaluations)| solids.fit(input, cluster, returns, evaluations));
                 if fit.is_some_and(|fit| output.fits.push(fit).is_err()) {
                     verdict = Verdict::PartialFits;
                 }
@@ -83,14 +100,14 @@ impl Solids {
     }
 
     /// None for a cluster that is wider than any solid looked for.
-    fn fit(&mut self, input: &Clusters, cluster: &Cluster, returns: &[Return]) -> Option<Fit> {
+    fn fit(&mut self, input: &Clusters, cluster: &Cluster, returns: &[Return], evaluations: u64) -> Option<Fit> {
         if width_m(returns) > self.settings.widest_m {
             return None;
         }
         let header = &input.header;
         self.bundle.take(input, cluster, returns);
         let sigma_m = f64::from(header.range_sigma_m).max(self.settings.range_sigma_m);
-        let mut fit = self.fitter.fit(&self.bundle, sigma_m);
+        let mut fit = self.fitter.fit_within(evaluations, &self.bundle, sigma_m);
         fit.relief = self.relief.describe(returns);
         Some(fit)
     }

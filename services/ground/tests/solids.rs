@@ -52,6 +52,7 @@ fn the_classifier_takes_the_model_and_its_card_says_what_it_reached() {
         method: Method::BoostedTrees,
         model: trained.name.clone(),
         least_posterior: 0.0,
+        overload: None,
         files: Some(trained.files.clone()),
     };
     assert!(Classifier::init(params).is_ok());

@@ -52,7 +52,10 @@ fn the_classifier_takes_what_training_writes() {
         assert!(parsed.scores["cluttered"]["mean_per_cent"].as_float().unwrap() > 0.0);
         assert_eq!(parsed.data["examples_of_each_class"].as_integer(), Some(40));
         let files = Some(ModelFiles { card, model: model_bytes });
-        assert!(Classifier::init(Params { method, model: model.clone(), least_posterior: 0.0, files }).is_ok());
+        assert!(
+            Classifier::init(Params { method, model: model.clone(), least_posterior: 0.0, overload: None, files })
+                .is_ok()
+        );
     }
     std::fs::remove_dir_all(&folder).unwrap();
     let held_out: u32 = trained.report.models[0].alone.counts().iter().flatten().sum();

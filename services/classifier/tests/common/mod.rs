@@ -72,13 +72,19 @@ pub(crate) fn card_text(kind: &str, file: &str, model: &[u8]) -> String {
 
 pub(crate) fn svm_params(text: &str) -> Params {
     let files = ModelFiles { card: card_text("svm", "model.libsvm", text.as_bytes()), model: text.into() };
-    Params { method: Method::Svm, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
+    Params { method: Method::Svm, model: "test".to_owned(), least_posterior: 0.0, overload: None, files: Some(files) }
 }
 
 pub(crate) fn naive_bayes_params() -> Params {
     let text = naive_bayes_text();
     let files = ModelFiles { card: card_text("naive-bayes", "model.txt", text.as_bytes()), model: text.into() };
-    Params { method: Method::NaiveBayes, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
+    Params {
+        method: Method::NaiveBayes,
+        model: "test".to_owned(),
+        least_posterior: 0.0,
+        overload: None,
+        files: Some(files),
+    }
 }
 
 /// A message with a descriptor of `points` members and the given bins for each entry.
@@ -119,7 +125,13 @@ pub(crate) fn trees_card(model: &[u8]) -> String {
 
 pub(crate) fn trees_params(text: &str) -> Params {
     let files = ModelFiles { card: trees_card(text.as_bytes()), model: text.into() };
-    Params { method: Method::BoostedTrees, model: "test".to_owned(), least_posterior: 0.0, files: Some(files) }
+    Params {
+        method: Method::BoostedTrees,
+        model: "test".to_owned(),
+        least_posterior: 0.0,
+        overload: None,
+        files: Some(files),
+    }
 }
 
 /// A fit to 10 hits of which one solid explains each to `residual` standard deviations, and the others to twice that and

@@ -93,6 +93,11 @@ impl Fitter {
     /// rays, best first, as far as the budget lasts. Every solid is owed one body on the few rays and one on the more: on
     /// a small budget up to four times both counts of rays are evaluated beyond it. Without hits the fit is all 0.
     pub fn fit(&mut self, bundle: &Bundle, sigma_m: f64) -> Fit {
+        self.fit_within(self.settings.evaluations, bundle, sigma_m)
+    }
+
+    /// As [`Fitter::fit`] on another budget.
+    pub fn fit_within(&mut self, evaluations: u64, bundle: &Bundle, sigma_m: f64) -> Fit {
         let mut fit = Fit::default();
         if bundle.hits.is_empty() {
             return fit;
@@ -102,7 +107,7 @@ impl Fitter {
         let frames = self.frames.find(&self.full.hits);
         self.find_axes(&frames);
 
-        let mut purse = Purse::new(self.settings.evaluations);
+        let mut purse = Purse::new(evaluations);
         self.scout(&frames, sigma_m, &mut purse);
         self.polish(sigma_m, &mut purse);
 
