@@ -54,8 +54,8 @@ fn a_broken_configuration_names_file_key_and_remedy() {
         refused(&["run", "--chain", &chain, "--sweeps", "1"], words);
         fs::write(&path, shipped).unwrap();
     };
-    with("chain.toml", "queue_parts = 4", "queue_parts = 0", &["chain.toml", "queue_parts is 0", "2 to 256"]);
-    with("chain.toml", "sectors = 1", "sektors = 1", &["chain.toml", "sektors"]);
+    with("chain.toml", "queue_sweeps = 4", "queue_sweeps = 0", &["chain.toml", "queue_sweeps is 0", "2 to 256"]);
+    with("chain.toml", "sectors = 36", "sektors = 36", &["chain.toml", "sektors"]);
     with("chain.toml", r#"reads = "Clusters""#, r#"reads = "Truth""#, &["chain.toml", "Truth"]);
     with("chain.toml", r#"name = "extractor""#, r#"name = "extraktor""#, &["extraktor"]);
     with("stages/clusterer.toml", "range_d_m = 1.0", "range_d_m = -1.0", &["stages/clusterer.toml", "range_d_m", "-1"]);

@@ -24,12 +24,10 @@ fn a_killed_stage_is_back_and_the_ledger_names_what_was_lost() {
             let killed = stages.iter().find(|s| s["stage"] == stage).unwrap();
             killed["restarts"] == 1 && killed["state"] == "running"
         });
-        let before = run.status().unwrap()["stages"][4]["received"].as_u64().unwrap();
-        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > before + 5);
+        run.wait_for_more(5);
         let run = stop_with_every_sweep_accounted_for(run, child);
         assert_eq!(run.process(stage)["restarts"], 1);
         assert_eq!(run.process(stage)["pids"].as_array().unwrap().len(), 2);
-        assert!(run.sweeps().windows(2).all(|pair| pair[0] < pair[1]), "sweep numbers go on rising");
     }
 }
 
@@ -150,7 +148,6 @@ fn kills_at_random_moments_start_up_included_keep_the_ledger_closed() {
         let mut deaths = 0;
         let mut back_after_ms = Vec::new();
         while deaths < kills() {
-            let before = received(&run);
             let killed_ns = clock::now_ns();
             // Refused while no process of the stage has taken its page: then there was no death to count.
             let kill = ["inject", "kill", stage, "--instance", &run.instance];
@@ -160,15 +157,14 @@ fn kills_at_random_moments_start_up_included_keep_the_ledger_closed() {
             deaths += 1;
             if deaths % 2 == 0 {
                 // Two sweeps: one may have been on its way.
-                run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > before + 1);
+                run.wait_for_more(2);
                 back_after_ms.push((clock::now_ns() - killed_ns) / 1_000_000);
             }
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             std::thread::sleep(std::time::Duration::from_millis(state >> 57));
         }
         println!("{stage}: {deaths} deaths, output again after at most {:?} ms", back_after_ms.iter().max());
-        let now = received(&run);
-        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+        run.wait_for_more(3);
         let run = stop_with_every_sweep_accounted_for(run, child);
         assert_eq!(run.process(stage)["restarts"].as_u64().unwrap(), u64::from(kills()));
     }
@@ -179,13 +175,8 @@ fn stop_with_every_sweep_accounted_for(run: Run, child: Child) -> Finished {
     super_stop(&run);
     let run = run.collect(child).expect_code(0);
     assert!(run.is_closed(), "{}", run.stdout());
-    let published = run.report["sweeps"].as_u64().unwrap();
-    assert_eq!(run.sweeps().len() as u64 + run.missing(), published, "{}", run.stdout());
+    run.expect_every_sweep_accounted_for();
     run
-}
-
-fn received(run: &Run) -> u64 {
-    run.status().unwrap()["stages"][4]["received"].as_u64().unwrap()
 }
 
 #[test]
@@ -201,8 +192,7 @@ fn a_death_in_doubt_is_settled_once() {
             std::thread::sleep(std::time::Duration::from_millis(150));
             run.inject(&["kill", stage]);
         });
-        let now = received(&run);
-        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+        run.wait_for_more(3);
     }
     stop_with_every_sweep_accounted_for(run, child);
 }
@@ -216,8 +206,7 @@ fn all_stages_killed_at_once_come_back_and_the_ledger_closes() {
     for stage in status["stages"].as_array().unwrap() {
         kill_process(Pid::from_raw(stage["pid"].as_i64().unwrap() as i32).unwrap(), Signal::KILL).unwrap();
     }
-    let now = received(&run);
-    run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+    run.wait_for_more(3);
     stop_with_every_sweep_accounted_for(run, child);
 }
 
@@ -242,13 +231,12 @@ fn a_death_at_fast_pace_names_what_it_cost_and_the_run_goes_on() {
     run.inject(&["slow", "classifier", "--by", "5ms"]);
     for _ in 0..3 {
         run.inject(&["kill", "clusterer"]);
-        let now = received(&run);
-        run.wait_for(|status| status["stages"][4]["received"].as_u64().unwrap() > now + 3);
+        run.wait_for_more(3);
     }
     let run = run.collect(child).expect_code(1); // what a death costs is no success at fast pace
     assert!(run.is_closed(), "{}", run.stdout());
     assert_eq!(run.report["sweeps"], 400);
-    assert_eq!(run.sweeps().len() as u64 + run.missing(), 400);
+    run.expect_every_sweep_accounted_for();
     let dropped: u64 = STAGES[1..].iter().map(|stage| support::sum(&run.hop(stage)["dropped"])).sum();
     assert_eq!(dropped, 0, "the window holds through deaths");
 }

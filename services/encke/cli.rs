@@ -96,7 +96,7 @@ Examples:
 const INJECT_EXAMPLES: &str = "Faults:
   kill     SIGKILL to the stage's process
   stop     SIGSTOP, and SIGCONT after --for (500 ms)
-  slow     make each of its cycles longer by --by (20 ms); --by 0ms ends it
+  slow     make its work on each sweep longer by --by (20 ms); --by 0ms ends it
   swallow  let it lose one part and say nothing: the ledger must come out OPEN
 
 Example:
@@ -330,7 +330,7 @@ pub(crate) struct InjectArgs {
     /// stop: for how long.
     #[arg(long = "for", value_name = "TIME", default_value = "500ms", value_parser = parse_duration)]
     pub(crate) length: Duration,
-    /// slow: by how much each cycle.
+    /// slow: by how much each sweep.
     #[arg(long, value_name = "TIME", default_value = "20ms", value_parser = parse_duration)]
     pub(crate) by: Duration,
     /// The chain. [default: the only one that runs]

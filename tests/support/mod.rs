@@ -120,6 +120,18 @@ impl Run {
         serde_json::from_slice(&output.stdout).ok()
     }
 
+    /// Sweeps that the recorder has received in full; 0 before the chain is up.
+    pub fn answered(&self) -> u64 {
+        self.status()
+            .map_or(0, |status| status["stages"][4]["received"].as_u64().unwrap() / status["sectors"].as_u64().unwrap())
+    }
+
+    /// Waits until so many more sweeps have come to the recorder.
+    pub fn wait_for_more(&self, sweeps: u64) {
+        let before = self.answered();
+        self.wait_for(|_| self.answered() >= before + sweeps);
+    }
+
     /// Puts a fault into it.
     pub fn inject(&self, args: &[&str]) {
         let output = encke().arg("inject").args(args).args(["--instance", &self.instance]).output().unwrap();
@@ -156,6 +168,24 @@ impl Finished {
     pub fn missing(&self) -> u64 {
         let hops = self.report["ledger"]["hops"].as_array().unwrap().iter();
         hops.map(|hop| hop["lost"].as_u64().unwrap() + sum(&hop["dropped"])).sum()
+    }
+
+    /// Asserts that each sweep has a line or is named among what is missing.
+    pub fn expect_every_sweep_accounted_for(&self) {
+        let lines = self.sweeps();
+        assert!(lines.windows(2).all(|pair| pair[0] < pair[1]), "sweep numbers go on rising");
+        let gaps = self.report["ledger"]["gaps"].as_array().unwrap();
+        let named = |sweep: u64| {
+            let number = |gap: &Value, key: &str| gap[key].as_u64().unwrap();
+            gaps.iter().any(|gap| (number(gap, "first_sweep")..=number(gap, "last_sweep")).contains(&sweep))
+        };
+        for sweep in 0..self.report["sweeps"].as_u64().unwrap() {
+            assert!(named(sweep) || lines.binary_search(&sweep).is_ok(), "sweep {sweep}: {}", self.stdout());
+        }
+        for line in self.detections.iter().filter(|line| line["complete"] != true) {
+            // The first and the last sweep of a recording may be partial by themselves.
+            assert!(named(line["sweep"].as_u64().unwrap()), "{} is not complete: {}", line["sweep"], self.stdout());
+        }
     }
 
     /// A process of the report.

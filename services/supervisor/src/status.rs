@@ -1,5 +1,6 @@
+use messages::Step;
 use runtime::page::PageMap;
-use runtime::{Plan, ShellError, clock};
+use runtime::{Plan, SOURCE, ShellError, clock};
 use serde::{Deserialize, Serialize};
 use transport::Instance;
 
@@ -12,6 +13,10 @@ pub struct Status {
     pub mode: String,
     /// Sweeps that the source has published.
     pub sweep: u64,
+    /// Sectors that a sweep travels as: so many parts are one sweep.
+    pub sectors: u32,
+    /// Step of degradation in force.
+    pub step: String,
     /// The stages in flow order, the source first.
     pub stages: Vec<StageStatus>,
 }
@@ -51,6 +56,9 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
             published: page.published.get(),
         });
     }
-    let sweep = stages.first().map_or(0, |source| source.published) / u64::from(plan.chain.sectors.max(1));
-    Ok(Status { instance: instance.name().to_owned(), mode: "nominal".to_owned(), sweep, stages })
+    let sectors = plan.chain.sectors;
+    let sweep = stages.first().map_or(0, |source| source.published) / u64::from(sectors.max(1));
+    let source = PageMap::open(&Plan::page_path(instance, SOURCE))?;
+    let step = Step::from_number(source.step.get() as u32).name().to_owned();
+    Ok(Status { instance: instance.name().to_owned(), mode: "nominal".to_owned(), sweep, sectors, step, stages })
 }

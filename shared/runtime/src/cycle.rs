@@ -54,7 +54,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             stage.process(trace.part, taken.message(), loan.message_mut())
         };
         let in_process = (shell.allocations)() - before_process;
-        shell.slow_down();
+        shell.slow_down(trace.part);
         let finished_ns = clock::now_ns();
 
         page.note_verdict(verdict);

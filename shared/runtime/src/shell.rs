@@ -1,5 +1,6 @@
 use std::time::Duration;
 
+use messages::Part;
 use transport::{Instance, Node};
 
 use crate::page::{PageMap, State};
@@ -89,10 +90,10 @@ impl Shell {
         tracing::debug!(stage = self.name, incarnation = self.incarnation, "running");
     }
 
-    /// Makes the cycle longer where a fault on purpose asks for it.
-    pub(crate) fn slow_down(&self) {
+    /// Makes the work on a sweep longer, with its last part, where a fault on purpose asks for it.
+    pub(crate) fn slow_down(&self, part: Part) {
         let slow_ns = self.page.slow_ns.get();
-        if slow_ns > 0 {
+        if slow_ns > 0 && part.is_last() {
             clock::sleep_ns(slow_ns);
         }
     }

@@ -41,7 +41,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
     fn take(&mut self, taken: &Taken<K::Input>) -> Result<(), ShellError> {
         if self.arrivals.receive(taken.trace()) {
             let verdict = self.sink.accept(taken.trace(), taken.message());
-            self.shell.slow_down();
+            self.shell.slow_down(taken.trace().part);
             self.shell.page.count_accepted(verdict);
             self.shell.page.put_down();
         }

@@ -96,7 +96,7 @@ impl<'a> Out<'a> {
         let began_ns = clock::now_ns();
         self.whole.clear();
         let next = source.next(&mut self.whole, truth)?;
-        self.shell.slow_down();
+        self.shell.slow_down(Part { sectors: 1, ..Part::default() });
         if next == Next::End || self.is_over(&self.whole.header) {
             return Ok(false);
         }

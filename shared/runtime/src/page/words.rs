@@ -161,7 +161,7 @@ pub struct Page {
     // Written by `encke inject`.
     /// Parts still to swallow.
     pub swallow: Word,
-    /// Time added to each `process` [ns].
+    /// Time added to the work on each sweep [ns].
     pub slow_ns: Word,
 }
 
