@@ -3,9 +3,12 @@
 use std::f32::consts::{PI, TAU};
 
 use lidar::{MAX_COLUMNS, MAX_RETURNS, MAX_RINGS};
-use messages::{Cell, CellKind, Cluster, Clusters, Sweep, Verdict};
+use messages::{Cell, CellKind, Cluster, Clusters, Verdict};
 
-use crate::image::NOBODY;
+use crate::seen::Seen;
+
+/// Where nothing was returned.
+const NOBODY: u32 = u32::MAX;
 
 /// How far from a member a cell lies at most, in rings and in columns.
 const REACH: usize = 2;
@@ -32,7 +35,7 @@ const NEAREST_FIRST: [(isize, isize); 24] = [
 /// range is smaller, else `Farther`.
 pub(crate) struct Cells {
     min_points: usize,
-    /// First return of each pixel, by ring and column.
+    /// First return of each pixel, by column and ring.
     pixel: Vec<u32>,
     /// Next return of the same pixel.
     next: Vec<u32>,
@@ -53,23 +56,37 @@ impl Cells {
         }
     }
 
+    /// Forgets the sweep before.
+    pub(crate) fn begin(&mut self) {
+        self.pixel.clear();
+        self.next.clear();
+    }
+
     /// Adds the cells of all clusters of at least the minimum of points. Once those of a cluster do not fit, neither
     /// it nor a later one gets any.
-    /// `cluster_of` has the number of each return's cluster.
-    pub(crate) fn fill(&mut self, sweep: &Sweep, cluster_of: &[u32], output: &mut Clusters) -> Verdict {
-        if !sweep.header.is_organised() || sweep.returns.is_empty() {
+    ///
+    /// `cluster_of` has the key of each return's cluster. Of the columns within two of a cluster's
+    /// nothing may be missing but what lies beyond the ends of the sweep, which may wrap round only where it is `last`.
+    pub(crate) fn fill(
+        &mut self,
+        seen: &Seen,
+        cluster_of: &[u32],
+        sense: f32,
+        last: bool,
+        output: &mut Clusters,
+    ) -> Verdict {
+        if !seen.header.is_organised() || seen.returns.is_empty() {
             return Verdict::Complete;
         }
-        self.index(sweep);
-        let mut field = Field::new(sweep, cluster_of);
+        self.index(seen);
+        let mut field = Field::new(seen, cluster_of, sense, last);
         for number in 0..output.clusters.len() {
             let cluster = output.clusters[number];
             if (cluster.summary.points as usize) < self.min_points {
                 continue;
             }
-            field.cluster = number as u32;
             let first = output.cells.len();
-            let fits = self.fill_cluster(&field, &cluster, output);
+            let fits = self.fill_cluster(&mut field, &cluster, output);
             if !fits {
                 output.cells.truncate(first);
                 return Verdict::PartialCells;
@@ -80,23 +97,23 @@ impl Cells {
         Verdict::Complete
     }
 
-    fn index(&mut self, sweep: &Sweep) {
-        let columns = sweep.columns.len();
-        self.pixel.clear();
-        self.pixel.resize(sweep.rings.len() * columns, NOBODY);
-        self.next.clear();
-        self.next.resize(sweep.returns.len(), NOBODY);
+    /// Adds the returns that were not seen before.
+    fn index(&mut self, seen: &Seen) {
+        let (rings, known) = (seen.rings.len(), self.next.len());
+        self.pixel.resize(rings * seen.columns.len(), NOBODY);
+        self.next.resize(seen.returns.len(), NOBODY);
         // From the back, so that each pixel's list runs in order of index.
-        for (place, r) in sweep.returns.iter().enumerate().rev() {
-            let pixel = &mut self.pixel[usize::from(r.ring) * columns + usize::from(r.column)];
+        for (place, r) in seen.returns.iter().enumerate().skip(known).rev() {
+            let pixel = &mut self.pixel[usize::from(r.column) * rings + usize::from(r.ring)];
             self.next[place] = std::mem::replace(pixel, place as u32);
         }
     }
 
     /// False when the message is full; then some of the cells are in it.
-    fn fill_cluster(&mut self, field: &Field, cluster: &Cluster, output: &mut Clusters) -> bool {
+    fn fill_cluster(&mut self, field: &mut Field, cluster: &Cluster, output: &mut Clusters) -> bool {
         let places = cluster.summary.member_places();
         let (mut low, mut high) = (usize::MAX, 0);
+        field.cluster = cluster.summary.key;
         for r in &output.returns[places.clone()] {
             let spot = usize::from(r.column) + REACH;
             self.members[spot] |= 1 << r.ring;
@@ -151,10 +168,10 @@ impl Cells {
             kind: CellKind::Unknown,
         };
         let Some(column) = field.received(spot) else { return cell };
-        let there = self.returns_at(field, ring, column).map(|place| field.sweep.returns[place].range_m());
+        let there = self.returns_at(field, ring, column).map(|place| field.seen.returns[place].range_m());
         let Some(range_m) = there.min_by(f32::total_cmp) else { return Cell { kind: CellKind::Miss, ..cell } };
         let member = self.nearest_member(field, spot, ring);
-        let nearer = member.is_some_and(|place| range_m < field.sweep.returns[place].range_m());
+        let nearer = member.is_some_and(|place| range_m < field.seen.returns[place].range_m());
         Cell { range_m, kind: if nearer { CellKind::Nearer } else { CellKind::Farther }, ..cell }
     }
 
@@ -179,7 +196,7 @@ impl Cells {
 
     /// Places of the returns of a firing, in order.
     fn returns_at(&self, field: &Field, ring: usize, column: usize) -> impl Iterator<Item = usize> {
-        let first = self.pixel[ring * field.columns + column];
+        let first = self.pixel[column * field.rings + ring];
         std::iter::successors(Some(first), |&place| self.next.get(place as usize).copied())
             .take_while(|&place| place != NOBODY)
             .map(|place| place as usize)
@@ -188,10 +205,12 @@ impl Cells {
 
 /// The sweep as a field of cells.
 struct Field<'a> {
-    sweep: &'a Sweep,
-    /// Number of each return's cluster.
+    seen: &'a Seen<'a>,
+    /// Whether the first column follows the last.
+    wraps: bool,
+    /// Key of each return's cluster.
     cluster_of: &'a [u32],
-    /// The cluster whose cells are sought.
+    /// Key of the cluster whose cells are sought.
     cluster: u32,
     rings: usize,
     columns: usize,
@@ -203,17 +222,18 @@ struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    fn new(sweep: &'a Sweep, cluster_of: &'a [u32]) -> Self {
-        let (rings, columns) = (sweep.rings.len(), sweep.columns.len());
-        let period_ns = sweep.header.period_ns;
+    fn new(seen: &'a Seen<'a>, cluster_of: &'a [u32], sense: f32, last: bool) -> Self {
+        let (rings, columns) = (seen.rings.len(), seen.columns.len());
+        let period_ns = seen.header.period_ns;
         Self {
-            sweep,
+            seen,
+            wraps: last && seen.header.is_complete(),
             cluster_of,
             cluster: 0,
             rings,
             columns,
             ring_bits: u64::MAX >> (MAX_RINGS - rings),
-            sense: crate::turn::sense(&sweep.columns),
+            sense,
             turn_rad_per_ns: if period_ns == 0 { 0.0 } else { TAU / period_ns as f32 },
         }
     }
@@ -221,7 +241,7 @@ impl<'a> Field<'a> {
     /// The spot some columns away: round the turn where the sweep is complete, on past its ends where it is not.
     fn spot(&self, spot: usize, columns: isize) -> usize {
         let there = spot.saturating_add_signed(columns);
-        if !self.sweep.header.is_complete() {
+        if !self.wraps {
             return there;
         }
         // Turns are added so that two columns before the first one still count upwards.
@@ -237,7 +257,7 @@ impl<'a> Field<'a> {
     /// The column of a spot if it was received.
     fn received(&self, spot: usize) -> Option<usize> {
         let column = spot.checked_sub(REACH)?;
-        self.sweep.columns.get(column).filter(|column| column.valid != 0).map(|_| column)
+        self.seen.columns.get(column).filter(|column| column.valid != 0).map(|_| column)
     }
 
     /// Azimuth of a firing [rad] in [−π, π): its column's and the head's turn since the column's first firing. Past the
@@ -245,9 +265,9 @@ impl<'a> Field<'a> {
     fn azimuth_rad(&self, spot: usize, ring: usize) -> f32 {
         let column = spot.saturating_sub(REACH).min(self.columns - 1);
         let beyond = spot as f32 - (column + REACH) as f32;
-        let turned_rad = self.turn_rad_per_ns * self.sweep.rings[ring].offset_ns as f32;
-        let on_rad = self.sense * (beyond * self.sweep.header.column_step_rad + turned_rad);
-        let azimuth_rad = (self.sweep.columns[column].azimuth_rad + on_rad + PI).rem_euclid(TAU) - PI;
+        let turned_rad = self.turn_rad_per_ns * self.seen.rings[ring].offset_ns as f32;
+        let on_rad = self.sense * (beyond * self.seen.header.column_step_rad + turned_rad);
+        let azimuth_rad = (self.seen.columns[column].azimuth_rad + on_rad + PI).rem_euclid(TAU) - PI;
         match azimuth_rad {
             finite if finite < PI => finite,
             rounded_up if rounded_up.is_finite() => -PI,

@@ -1,103 +1,116 @@
 use lidar::MAX_RETURNS;
-use messages::{Cluster, ClusterSummary, Clusters, Sweep};
+use messages::{Cluster, ClusterSummary, Clusters};
 
+use crate::partition::Partition;
 use crate::seam::Seam;
+use crate::seen::Seen;
 
-/// Lays a partition out as clusters: in order of keys, members in order of index.
+/// No cluster yet.
+pub(crate) const OPEN: u32 = u32::MAX;
+
+/// Lays closed sets out as clusters: in order of keys, members in order of index.
 pub(crate) struct Gather {
     seam: Seam,
-    /// Number of each return's cluster.
-    cluster: Vec<u32>,
-    /// Next free place in the message of each cluster.
-    next: Vec<u32>,
-    /// Places of the returns in the sweep, cluster after cluster.
-    order: Vec<u32>,
+    /// Key of each return's cluster; [`OPEN`] where that has not closed.
+    cluster_of: Vec<u32>,
+    /// A cluster's returns, a bit a place in the sweep; all zero between clusters.
+    members: Vec<u64>,
 }
 
 impl Gather {
     pub(crate) fn new(range_d_m: f32) -> Self {
         Self {
             seam: Seam::new(range_d_m),
-            cluster: Vec::with_capacity(MAX_RETURNS),
-            next: Vec::with_capacity(MAX_RETURNS),
-            order: Vec::with_capacity(MAX_RETURNS),
+            cluster_of: Vec::with_capacity(MAX_RETURNS),
+            members: vec![0; MAX_RETURNS.div_ceil(64)],
         }
     }
 
-    /// Fills everything but the cells of an empty message. `roots` has the place of its component's first return for
-    /// each return.
-    pub(crate) fn fill(&mut self, sweep: &Sweep, roots: &[u32], output: &mut Clusters) {
-        self.sort(roots);
-        if sweep.header.is_organised() {
-            self.seam.measure(sweep);
+    /// Forgets the sweep before.
+    pub(crate) fn begin(&mut self) {
+        self.cluster_of.clear();
+    }
+
+    /// Fills everything but the cells of what closed into an empty message. What closes before the `last` part lies off the
+    /// seam.
+    pub(crate) fn fill(&mut self, seen: &Seen, partition: &Partition, last: bool, output: &mut Clusters) {
+        self.cluster_of.resize(seen.returns.len(), OPEN);
+        if last && seen.header.is_organised() {
+            self.seam.measure(seen);
         }
-        // Nothing below can be full: there are at most as many clusters and members as returns.
-        for &place in &self.order {
-            let _ = output.returns.push(sweep.returns[place as usize]);
-            let _ = output.members.push(sweep.index_of(place as usize));
-        }
-        let mut first = 0_u32;
-        for &end in &self.next {
-            let cluster = Cluster { summary: self.summary(sweep, first, end, output), ..Cluster::default() };
+        for &root in partition.closed() {
+            let first = output.returns.len();
+            self.push_members(seen, partition, root, output);
+            let cluster = Cluster { summary: self.summary(seen, first, last, output), ..Cluster::default() };
+            // Nothing can be full: there are at most as many clusters and members as returns.
             let _ = output.clusters.push(cluster);
-            first = end;
         }
     }
 
-    /// Number of the cluster of each return of the sweep filled in last.
+    /// Key of the cluster of each return seen; [`OPEN`] where that has not closed.
     pub(crate) fn cluster_of(&self) -> &[u32] {
-        &self.cluster
+        &self.cluster_of
     }
 
-    /// Counting sort. A component's root is its first return, so numbering roots as they come orders clusters by key.
-    fn sort(&mut self, roots: &[u32]) {
-        self.cluster.clear();
-        self.next.clear();
-        for (place, &root) in roots.iter().enumerate() {
-            if root as usize == place {
-                self.cluster.push(self.next.len() as u32);
-                self.next.push(0);
-            } else {
-                self.cluster.push(self.cluster[root as usize]);
+    /// Runs come in no order and overlap, so their returns are put in order as bits.
+    fn push_members(&mut self, seen: &Seen, partition: &Partition, root: u32, output: &mut Clusters) {
+        let runs = partition.runs();
+        let key = seen.index_of(runs.places(root)[0] as usize);
+        if runs.places(root).len() == partition.sets().extent(root).points as usize {
+            for &place in runs.places(root) {
+                self.push_member(seen, place, key, output);
             }
-            self.next[self.cluster[place] as usize] += 1;
+            return;
         }
-        let mut first = 0;
-        for next in &mut self.next {
-            first += std::mem::replace(next, first);
+        let (mut low, mut high) = (usize::MAX, 0);
+        for run in partition.sets().members(root) {
+            let places = runs.places(run);
+            for &place in places {
+                self.members[place as usize / 64] |= 1 << (place % 64);
+            }
+            let (Some(first), Some(last)) = (places.first(), places.last()) else { continue };
+            (low, high) = (low.min(*first as usize / 64), high.max(*last as usize / 64));
         }
-        self.order.clear();
-        self.order.resize(roots.len(), 0);
-        for (place, &cluster) in self.cluster.iter().enumerate() {
-            let next = &mut self.next[cluster as usize];
-            self.order[*next as usize] = place as u32;
-            *next += 1; // in the end the end of its cluster
+        for word in low..=high {
+            let mut bits = std::mem::take(&mut self.members[word]);
+            while bits != 0 {
+                self.push_member(seen, (word * 64) as u32 + bits.trailing_zeros(), key, output);
+                bits &= bits - 1;
+            }
         }
     }
 
-    fn summary(&self, sweep: &Sweep, first: u32, end: u32, output: &Clusters) -> ClusterSummary {
-        let places = first as usize..end as usize;
-        let organised = sweep.header.is_organised();
+    #[inline]
+    fn push_member(&mut self, seen: &Seen, place: u32, key: u32, output: &mut Clusters) {
+        self.cluster_of[place as usize] = key;
+        let _ = output.returns.push(seen.returns[place as usize]);
+        let _ = output.members.push(seen.index_of(place as usize));
+    }
+
+    /// Of the cluster whose returns are those from `first` on.
+    fn summary(&self, seen: &Seen, first: usize, last: bool, output: &Clusters) -> ClusterSummary {
+        let organised = seen.header.is_organised();
+        let returns = &output.returns[first..];
         let (mut rings, mut last_offset_ns, mut seam) = (0_u64, 0, false);
         let mut sum = [0.0_f64; 3];
-        for r in &output.returns[places.clone()] {
+        for r in returns {
             sum = [sum[0] + f64::from(r.x), sum[1] + f64::from(r.y), sum[2] + f64::from(r.z)];
             if organised {
                 rings |= 1 << r.ring;
-                let (column, ring) = (sweep.columns[usize::from(r.column)], sweep.rings[usize::from(r.ring)]);
+                let (column, ring) = (seen.columns[usize::from(r.column)], seen.rings[usize::from(r.ring)]);
                 last_offset_ns = last_offset_ns.max(column.offset_ns.saturating_add(ring.offset_ns));
-                seam |= self.seam.touches(r);
+                seam |= last && self.seam.touches(r);
             }
         }
         ClusterSummary {
-            key: output.members[places.start],
-            first_member: first,
-            points: end - first,
+            key: output.members[first],
+            first_member: first as u32,
+            points: returns.len() as u32,
             rings: rings.count_ones(),
             // A cloud without firing times is complete with its period.
-            last_offset_ns: if organised { last_offset_ns } else { sweep.header.period_ns.min(u32::MAX.into()) as u32 },
+            last_offset_ns: if organised { last_offset_ns } else { seen.header.period_ns.min(u32::MAX.into()) as u32 },
             seam: u32::from(seam || !organised),
-            centroid_m: sum.map(|sum| (sum / f64::from(end - first)) as f32),
+            centroid_m: sum.map(|sum| (sum / returns.len() as f64) as f32),
         }
     }
 }

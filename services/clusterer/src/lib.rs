@@ -23,18 +23,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arcsine;
 mod cells;
 mod clusterer;
 mod distance;
 mod gather;
-mod image;
 mod input;
 mod params;
 mod partition;
+mod runs;
 mod scan;
 mod seam;
+mod seen;
+mod sequence;
 mod sets;
-mod slack;
+mod stray;
 mod tree;
 mod turn;
 pub mod validation;

@@ -1,221 +1,221 @@
-//! The scan-window method: exact, for sweeps in firing order of rings × columns.
+//! The scan-window method: exact, for sweeps in firing order.
 //!
-//! If |p − q| ≤ d and p has range r and horizontal range h, then the elevations of p and q differ by at most asin(d/r)
-//! and their azimuths by at most asin(d/h), whatever the range of q. So of each pair the one whose column comes later,
-//! looking back over its own window, finds the other; across the seam it is the one just after the seam.
+//! If |p − q| ≤ d and p has horizontal range h, then the azimuths of p and q differ by at most asin(d/h), whatever the
+//! range of q. So of each pair the one whose column comes later, looking back over its own window, finds the other;
+//! across the seam it is the one just after the seam.
 
-use lidar::{MAX_COLUMNS, MAX_RETURNS, Return};
-use messages::Sweep;
+use std::f32::consts::TAU;
 
+use lidar::MAX_COLUMNS;
+
+use crate::arcsine::arcsine_above;
 use crate::distance::ROUNDING;
-use crate::image::{Image, Seeker};
-use crate::sets::Sets;
-use crate::slack::{Slack, arcsine_above};
+use crate::runs::{BLOCK_COLUMNS, Run, Runs};
+use crate::seen::Seen;
+use crate::sets::{Extent, Sets};
 use crate::turn::Turn;
 
 /// Horizontal range below which azimuth bounds nothing, as a factor of d. Short of 1/0.98 the arcsine is too steep
 /// for single precision, so a little above d counts as close too.
-const CLOSE: f32 = 1.02;
+pub(crate) const CLOSE: f32 = 1.02;
 /// Horizontal range within which all neighbours of close returns lie: CLOSE + 1, and a margin.
 const NEAR: f32 = 2.03;
-/// Sine of the largest angle between a return and its column that the window allows for: half a radian.
-const SIDEWAYS_SINE: f32 = 0.479;
-/// Sine of the elevation above which single precision is too coarse to measure it.
-const STEEP_SINE: f32 = 0.999;
-/// Squared range above which nothing is measured any more [m²].
-const FAR_M2: f32 = 1e12;
-/// Widest spread of elevations on a ring, and of azimuths relative to the column, at which the window is quick [rad].
-/// A sensor whose lasers sit 0.2 m apart in height shows 0.05 rad at 4 m.
-const REGULAR_RAD: [f32; 2] = [0.05, 0.1];
+/// Margin on every window for single-precision rounding [rad]: ten times what it can come to.
+const MARGIN_RAD: f32 = 2e-5;
+/// Columns round a member in which something may still change for its cluster, at least: two of cells and one for the
+/// dropout test on the outer ones; and one more, for the last column itself must not be among them.
+const LEAST_COLUMNS: f32 = 4.0;
 
-/// Which sweeps are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Premises {
-    /// The window is exact.
-    Exact,
-    /// The window is exact and narrow: returns lie where ring and column say.
-    Regular,
-}
-
-/// What a return can reach.
+/// A block of columns.
 #[derive(Clone, Copy)]
-struct Reach {
-    /// asin(d/h), rounded up [rad]; infinite for close returns.
-    azimuth_rad: f32,
-    /// d/r, rounded up.
-    elevation_sine: f32,
+struct Block {
+    /// Its first run.
+    first_run: u32,
+    /// Farthest travel of its columns and all before [rad].
+    reached_rad: f32,
+    /// Lowest travel from which on its runs have neighbours [rad].
+    earliest_rad: f32,
 }
 
 /// The scan-window method and its memory.
-pub(crate) struct ScanWindow {
+pub(crate) struct Scan {
     range_d_m: f32,
-    image: Image,
-    turn: Turn,
-    slack: Slack,
-    column_sine_cosine: Vec<[f32; 2]>,
-    reaches: Vec<Reach>,
-    close: Vec<u32>,
+    stray_rad: f32,
+    step_rad: f32,
+    runs: Runs,
+    /// Travel from which on each run has neighbours [rad].
+    earliest_rad: Vec<f32>,
+    blocks: Vec<Block>,
+    /// Blocks that have runs with h ≤ CLOSE · d, and with h ≤ NEAR · d.
+    close_blocks: Vec<u32>,
+    near_blocks: Vec<u32>,
 }
 
-impl ScanWindow {
+impl Scan {
     pub(crate) fn new(range_d_m: f32) -> Self {
+        let most_blocks = MAX_COLUMNS.div_ceil(BLOCK_COLUMNS);
         Self {
             range_d_m,
-            image: Image::new(),
-            turn: Turn::new(),
-            slack: Slack::new(),
-            column_sine_cosine: Vec::with_capacity(MAX_COLUMNS),
-            reaches: Vec::with_capacity(MAX_RETURNS),
-            close: Vec::with_capacity(MAX_RETURNS),
+            stray_rad: 0.0,
+            step_rad: 0.0,
+            runs: Runs::new(),
+            earliest_rad: Vec::with_capacity(lidar::MAX_RETURNS),
+            blocks: Vec::with_capacity(most_blocks),
+            close_blocks: Vec::with_capacity(most_blocks),
+            near_blocks: Vec::with_capacity(most_blocks),
         }
     }
 
-    /// Joins all pairs of returns within d. False, and sets of no meaning, where the sweep does not meet the premises.
-    pub(crate) fn partition(&mut self, sweep: &Sweep, premises: Premises, sets: &mut Sets) -> bool {
-        if !sweep.header.is_organised() || !self.turn.measure(&sweep.columns) || !self.place(sweep) {
-            return false;
-        }
-        let [elevation_rad, azimuth_rad] = REGULAR_RAD;
-        if premises == Premises::Regular && !self.slack.is_within(elevation_rad, azimuth_rad) {
-            return false;
-        }
-        self.slack.tabulate();
-        sets.reset(sweep.returns.len());
-        self.join_close(sweep, sets);
-        self.join_windows(sweep, sets);
-        true
+    /// Begins a sweep whose returns lie within `stray_rad` of their columns; `step_rad` is its columns' usual step.
+    pub(crate) fn begin(&mut self, stray_rad: f32, step_rad: f32) {
+        self.stray_rad = stray_rad;
+        self.step_rad = step_rad;
+        self.runs.reset();
+        self.earliest_rad.clear();
+        self.blocks.clear();
+        self.close_blocks.clear();
+        self.near_blocks.clear();
     }
 
-    /// Lays the returns out as an image, measuring where they are; false where ring and column do not say it.
-    fn place(&mut self, sweep: &Sweep) -> bool {
-        self.image.reset(sweep.rings.len(), sweep.columns.len());
-        self.slack.reset(sweep.rings.len());
-        self.reaches.clear();
-        self.close.clear();
-        self.column_sine_cosine.clear();
-        self.column_sine_cosine
-            .extend(sweep.columns.iter().map(|column| <[f32; 2]>::from(column.azimuth_rad.sin_cos())));
-        let reach_m = self.range_d_m * ROUNDING;
-        let (close_m, near_m) = (self.range_d_m * CLOSE, self.range_d_m * NEAR);
-        let sense = self.turn.sense();
-        for (place, r) in sweep.returns.iter().enumerate() {
-            let place = place as u32;
-            let h_m2 = r.x * r.x + r.y * r.y;
-            let range_m2 = h_m2 + r.z * r.z;
-            // No sensor's; also catches overflow.
-            if range_m2 >= FAR_M2 {
-                return false;
-            }
-            let (h_m, range_m) = (h_m2.sqrt(), range_m2.sqrt());
-            if h_m <= near_m {
-                self.image.put_close(r.position(), place);
-            }
-            // h ≤ d: the window is the whole turn, and such returns are looked for nowhere else.
-            if h_m <= close_m {
-                self.close.push(place);
-                self.reaches.push(Reach { azimuth_rad: f32::INFINITY, elevation_sine: f32::INFINITY });
+    pub(crate) fn runs(&self) -> &Runs {
+        &self.runs
+    }
+
+    pub(crate) fn runs_mut(&mut self) -> &mut Runs {
+        &mut self.runs
+    }
+
+    /// Number of columns whose returns are joined.
+    pub(crate) fn joined_columns(&self) -> usize {
+        self.blocks.len() * BLOCK_COLUMNS
+    }
+
+    /// Farthest travel of the columns whose returns are joined [rad].
+    pub(crate) fn reached_rad(&self) -> f32 {
+        self.blocks.last().map_or(f32::NEG_INFINITY, |block| block.reached_rad)
+    }
+
+    /// What a window is widened by: both returns stray.
+    pub(crate) fn widening_rad(&self) -> f32 {
+        2.0 * self.stray_rad + MARGIN_RAD
+    }
+
+    /// Joins the returns of all blocks that have been seen whole with all before them.
+    pub(crate) fn go_on(&mut self, seen: &Seen, turn: &Turn, sets: &mut Sets) {
+        while self.joined_columns() + BLOCK_COLUMNS <= seen.columns.len() {
+            self.join_block(seen, turn, sets);
+        }
+    }
+
+    /// Joins the rest of the sweep, and across the seam.
+    pub(crate) fn finish(&mut self, seen: &Seen, turn: &Turn, sets: &mut Sets) {
+        while self.joined_columns() < seen.columns.len() {
+            self.join_block(seen, turn, sets);
+        }
+        self.join_seam(sets);
+    }
+
+    fn join_block(&mut self, seen: &Seen, turn: &Turn, sets: &mut Sets) {
+        let columns = self.joined_columns()..(self.joined_columns() + BLOCK_COLUMNS).min(seen.columns.len());
+        let first_return = self.runs.returns();
+        let returns = seen.returns[first_return..].iter().take_while(|r| usize::from(r.column) < columns.end).count();
+        let within_m2 = self.range_d_m * self.range_d_m;
+        let first_run = self.runs.len() as u32;
+        self.runs.lay(seen, first_return..first_return + returns, turn.travels_rad(), within_m2);
+        let reached_rad = turn.travels_rad()[columns].iter().copied().fold(self.reached_rad(), f32::max);
+        let number = self.blocks.len() as u32;
+        self.blocks.push(Block { first_run, reached_rad, earliest_rad: f32::INFINITY });
+        let (close_m2, near_m2) = (self.least_m2(CLOSE), self.least_m2(NEAR));
+        let least_m2 = self.runs.block().iter().map(|run| run.least_h_m2).fold(f32::INFINITY, f32::min);
+        if least_m2 <= close_m2 {
+            self.close_blocks.push(number);
+        }
+        if least_m2 <= near_m2 {
+            self.near_blocks.push(number);
+        }
+        for place in 0..self.runs.block().len() {
+            let run = self.runs.block()[place];
+            let window_rad = self.window_rad(&run);
+            sets.push(self.extent(&run, window_rad));
+            self.earliest_rad.push(run.travel_rad[0] - window_rad - self.widening_rad());
+        }
+        for place in 0..self.runs.block().len() as u32 {
+            let least_m2 = self.runs.block()[place as usize].least_h_m2;
+            self.look_back(sets, first_run + place, least_m2);
+        }
+    }
+
+    fn least_m2(&self, factor: f32) -> f32 {
+        (factor * self.range_d_m) * (factor * self.range_d_m)
+    }
+
+    /// asin(d/h), rounded up, for the nearest return of a run that is not close [rad].
+    fn window_rad(&self, run: &Run) -> f32 {
+        let h_m = run.least_h_m2.sqrt().max(CLOSE * self.range_d_m);
+        arcsine_above(self.range_d_m * ROUNDING / h_m)
+    }
+
+    fn extent(&self, run: &Run, window_rad: f32) -> Extent {
+        // One column for the head's turn, one for the last column itself, one for rounding.
+        let columns = (window_rad / self.step_rad + 3.0).max(LEAST_COLUMNS) as u32;
+        let is_close = run.least_h_m2 <= self.least_m2(CLOSE);
+        Extent {
+            points: run.points,
+            column: u32::from(run.last_column).saturating_add(columns),
+            travel_rad: run.travel_rad[1] + window_rad,
+            held: is_close
+                || u32::from(run.first_column) <= columns
+                || run.travel_rad[0] - window_rad - self.widening_rad() <= 0.0,
+        }
+    }
+
+    /// Joins a run of the newest block with all before it that it has a return within d of.
+    fn look_back(&mut self, sets: &mut Sets, run: u32, least_h_m2: f32) {
+        let within_m2 = self.range_d_m * self.range_d_m;
+        let seeker = self.runs.seeker(run, self.range_d_m * ROUNDING);
+        let earliest_rad = self.earliest_rad[run as usize];
+        let newest = self.blocks.len() - 1;
+        self.blocks[newest].earliest_rad = self.blocks[newest].earliest_rad.min(earliest_rad);
+        let mut block = newest;
+        while block > 0 && self.blocks[block - 1].reached_rad >= earliest_rad {
+            block -= 1;
+        }
+        let mut root = sets.root(run);
+        root = self.runs.join(sets, run, seeker, self.blocks[block].first_run..run, within_m2, root);
+        // Close returns are anywhere in the sweep, and so are their neighbours.
+        let elsewhere = match least_h_m2 {
+            h_m2 if h_m2 <= self.least_m2(CLOSE) => &self.near_blocks,
+            h_m2 if h_m2 <= self.least_m2(NEAR) => &self.close_blocks,
+            _ => return,
+        };
+        for &other in elsewhere.iter().take_while(|&&other| (other as usize) < block) {
+            let runs = self.blocks[other as usize].first_run..self.blocks[other as usize + 1].first_run;
+            root = self.runs.join(sets, run, seeker, runs, within_m2, root);
+        }
+    }
+
+    /// Joins the runs just after the seam with those just before it.
+    fn join_seam(&mut self, sets: &mut Sets) {
+        let (within_m2, end_rad) = (self.range_d_m * self.range_d_m, self.reached_rad());
+        for number in 0..self.blocks.len() {
+            if self.blocks[number].earliest_rad + TAU > end_rad {
                 continue;
             }
-            let [sine, cosine] = self.column_sine_cosine[usize::from(r.column)];
-            let along_m = r.x * cosine + r.y * sine;
-            let azimuth_sine = sense * (r.y * cosine - r.x * sine) / h_m;
-            let elevation_sine = r.z / range_m;
-            if along_m <= 0.0 || azimuth_sine.abs() > SIDEWAYS_SINE || elevation_sine.abs() > STEEP_SINE {
-                return false;
-            }
-            self.slack.include(r.ring, elevation_sine, azimuth_sine);
-            self.reaches.push(Reach { azimuth_rad: arcsine_above(reach_m / h_m), elevation_sine: reach_m / range_m });
-            // Two returns of one firing: there is one pixel only.
-            if !self.image.put(r.ring, r.column, r.position(), range_m, place) {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// By the triangle inequality, ranges of returns within d differ by at most d; ranges round as distances do.
-    fn seeker(&self, r: &Return) -> Seeker {
-        let (range_m, reach_m) = (r.range_m(), self.range_d_m * ROUNDING);
-        Seeker {
-            position: r.position(),
-            within_m2: self.range_d_m * self.range_d_m,
-            near_m: range_m / ROUNDING - reach_m,
-            far_m: range_m * ROUNDING + reach_m,
-        }
-    }
-
-    /// Close returns with each other and with all they can reach.
-    fn join_close(&mut self, sweep: &Sweep, sets: &mut Sets) {
-        let lone = sets.count() - self.image.close_count();
-        for &place in &self.close {
-            // All in one set: nothing is left to find.
-            if sets.count() == lone + 1 {
-                return;
-            }
-            let seeker = self.seeker(&sweep.returns[place as usize]);
-            let root = sets.root(place);
-            self.image.join_close(sets, seeker, root);
-        }
-    }
-
-    /// All other pairs: each return looks back over its window.
-    fn join_windows(&mut self, sweep: &Sweep, sets: &mut Sets) {
-        let rings = sweep.rings.len();
-        for (place, (r, &reach)) in sweep.returns.iter().zip(&self.reaches).enumerate() {
-            if reach.azimuth_rad == f32::INFINITY {
-                continue;
-            }
-            let own = usize::from(r.ring);
-            let mut window = Window {
-                seeker: self.seeker(r),
-                column: usize::from(r.column),
-                last_column: sweep.columns.len() - 1,
-                earliest_rad: self.turn.travel_rad(usize::from(r.column)) - reach.azimuth_rad,
-                root: sets.root(place as u32),
-            };
-            let (image, turn, slack) = (&mut self.image, &self.turn, &self.slack);
-            window.look(image, turn, sets, own, slack.shift_rad(own, own));
-            let (mut up, mut down) = (true, true);
-            for step in 1..rings {
-                up = up && own + step < rings && slack.gap_sine(own, own + step) <= reach.elevation_sine;
-                down = down && step <= own && slack.gap_sine(own, own - step) <= reach.elevation_sine;
-                if up {
-                    window.look(image, turn, sets, own + step, slack.shift_rad(own, own + step));
+            let end = self.blocks.get(number + 1).map_or(self.runs.len() as u32, |next| next.first_run);
+            for run in self.blocks[number].first_run..end {
+                let earliest_rad = self.earliest_rad[run as usize] + TAU;
+                if earliest_rad > end_rad {
+                    continue;
                 }
-                if down {
-                    window.look(image, turn, sets, own - step, slack.shift_rad(own, own - step));
+                let mut block = self.blocks.len();
+                while block > number && self.blocks[block - 1].reached_rad >= earliest_rad {
+                    block -= 1;
                 }
-                if !up && !down {
-                    break;
-                }
+                let seeker = self.runs.seeker(run, self.range_d_m * ROUNDING);
+                let root = sets.root(run);
+                let others = self.blocks[block].first_run..self.runs.len() as u32;
+                self.runs.join(sets, run, seeker, others, within_m2, root);
             }
-            image.note(r.ring, r.column, window.root);
-        }
-    }
-}
-
-/// A return looking back.
-struct Window {
-    seeker: Seeker,
-    column: usize,
-    last_column: usize,
-    /// Its column's travel less asin(d/h).
-    earliest_rad: f32,
-    root: u32,
-}
-
-impl Window {
-    /// Looks along one ring: back to the window's edge, and over the seam where the window reaches past it.
-    #[inline]
-    fn look(&mut self, image: &mut Image, turn: &Turn, sets: &mut Sets, ring: usize, shift_rad: f32) {
-        let earliest_rad = self.earliest_rad + shift_rad;
-        let from = turn.first_from(earliest_rad);
-        if from <= self.column {
-            self.root = image.join_row(sets, self.seeker, ring, from, self.column, self.root);
-        }
-        let from = turn.first_from(earliest_rad + std::f32::consts::TAU).max(self.column + 1);
-        if from <= self.last_column {
-            self.root = image.join_row(sets, self.seeker, ring, from, self.last_column, self.root);
         }
     }
 }

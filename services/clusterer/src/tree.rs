@@ -2,10 +2,11 @@
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use lidar::MAX_RETURNS;
-use messages::Sweep;
 
 use crate::distance::squared_m2;
-use crate::sets::Sets;
+use crate::runs::Runs;
+use crate::seen::Seen;
+use crate::sets::{Extent, Sets};
 
 /// Radius of a query, as a factor of d: the tree rounds otherwise than [`squared_m2`], which has the last word.
 const WIDER: f32 = 1.000_1;
@@ -29,12 +30,16 @@ impl Tree {
         }
     }
 
-    /// Joins all pairs of returns within d.
-    pub(crate) fn partition(&mut self, sweep: &Sweep, sets: &mut Sets) {
-        let count = sweep.returns.len();
-        sets.reset(count);
+    /// Joins all pairs of returns within d. Each return is a run of its own.
+    pub(crate) fn partition(&mut self, seen: &Seen, runs: &mut Runs, sets: &mut Sets) {
+        let count = seen.returns.len();
+        runs.lay_alone(count);
+        sets.reset();
+        for _ in 0..count {
+            sets.push(Extent { points: 1, column: 0, travel_rad: 0.0, held: true });
+        }
         self.positions.clear();
-        self.positions.extend(sweep.returns.iter().map(|r| r.position()));
+        self.positions.extend(seen.returns.iter().map(|r| r.position()));
         // Fails for more items than the index can number only: a sweep has far fewer.
         let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(&self.positions) else { return };
         let within_m2 = self.range_d_m * self.range_d_m;
@@ -64,7 +69,7 @@ impl Tree {
                     }
                 });
             }
-            for &member in queue.iter() {
+            for &member in &queue[1..] {
                 sets.join(start as u32, member);
             }
         }

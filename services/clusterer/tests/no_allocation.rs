@@ -64,5 +64,8 @@ fn regular_sweeps_are_scanned_without_allocating_and_others_go_to_the_tree() {
     let again = *dual.returns.last().unwrap();
     let _ = dual.returns.push(again);
     dual.header.recorded += 1;
+    assert!(scans(Auto, &dual) && scans(Scan, &dual));
+    // Returns that are not in order of their columns.
+    dual.returns.swap(0, 900);
     assert!(!scans(Auto, &dual) && !scans(Scan, &dual));
 }

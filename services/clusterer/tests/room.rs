@@ -93,17 +93,19 @@ fn returns_without_a_firing_are_refused() {
 
 // verifies CLU-010
 #[test]
-fn parts_of_a_sweep_are_refused() {
+fn parts_that_no_sweep_has_are_refused() {
     let sweep = Scanner::default().sweep();
-    for sectors in [0, 2, 36] {
+    for (sector, sectors, expected) in [
+        (0, 0, Verdict::RejectedMalformed),
+        (1, 1, Verdict::RejectedMalformed),
+        (36, 36, Verdict::RejectedMalformed),
+        (1, 2, Verdict::RejectedIncomplete),
+    ] {
         let mut output = Clusters::new_box_zeroed().unwrap();
-        let verdict = room(Method::Auto, 1.0).process(Part { sectors, ..WHOLE }, &sweep, &mut output);
-        assert_eq!(verdict, Verdict::RejectedIncomplete);
+        let verdict = room(Method::Auto, 1.0).process(Part { sector, sectors, ..WHOLE }, &sweep, &mut output);
+        assert_eq!(verdict, expected, "sector {sector} of {sectors}");
         assert_nothing_but_the_header(&sweep, &output);
     }
-    let mut output = Clusters::new_box_zeroed().unwrap();
-    let verdict = room(Method::Auto, 1.0).process(Part { sector: 1, ..WHOLE }, &sweep, &mut output);
-    assert_eq!(verdict, Verdict::RejectedMalformed);
 }
 
 // verifies CLU-005

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 pub(crate) mod scanner;
+pub(crate) mod sectors;
 pub(crate) mod twins;
 
 use clusterer::validation::{brute_force_roots, roots_of};
