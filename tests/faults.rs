@@ -212,7 +212,8 @@ fn all_stages_killed_at_once_come_back_and_the_ledger_closes() {
 
 #[test]
 fn parts_swallowed_at_fast_pace_end_the_run_instead_of_hanging_it() {
-    let run = Run::new(&["--sweeps", "100000", "--pace", "fast"]);
+    // Half a queue of four whole sweeps is in flight at most: with two swallowed the window stays shut.
+    let run = Run::new(&["--sectors", "1", "--sweeps", "100000", "--pace", "fast"]);
     let child = run.start();
     run.wait_for_sweeps(5);
     for _ in 0..2 {

@@ -108,16 +108,18 @@ impl<'a> Out<'a> {
         Ok(true)
     }
 
-    /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before.
+    /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep
+    /// that has begun is sent to its end, unless the window stays shut.
     fn send(&mut self, ordinal: u64) -> Result<bool, ShellError> {
         let shell = self.shell;
         let sectors = shell.plan.chain.sectors.max(1);
         let sector = (ordinal % u64::from(sectors)) as u32;
         if shell.plan.pace == Pace::Fast {
-            wait_while(shell, WINDOW_LOOK_NS, || !self.window.has_room(shell.page.published.get()));
-        }
-        if shell.leaving() {
-            return Ok(false);
+            let is_shut = || !self.window.has_room(shell.page.published.get());
+            wait_while(shell, WINDOW_LOOK_NS, is_shut);
+            if is_shut() {
+                return Ok(false);
+            }
         }
         // A sweep's first part had to wait for the sweep to be made.
         let received_ns = if sector == 0 { self.began_ns } else { clock::now_ns() };
@@ -129,7 +131,7 @@ impl<'a> Out<'a> {
             Pace::Fast => clock::now_ns(),
             Pace::Realtime => self.start_ns + self.cutter.end_offset_ns(&self.whole, sector),
         };
-        self.wait_until(due_ns);
+        self.wait_until(due_ns, || sector == 0 && shell.leaving());
         if clock::now_ns() < due_ns {
             shell.page.put_down();
             return Ok(false);
@@ -192,9 +194,9 @@ impl<'a> Out<'a> {
         self.shell.plan.duration_ns.is_some_and(|duration_ns| passed_ns > duration_ns)
     }
 
-    /// Sleeps until host time `until_ns`, alive, or until asked to leave.
-    fn wait_until(&self, until_ns: u64) {
-        while clock::now_ns() < until_ns && !self.shell.leaving() {
+    /// Sleeps until host time `until_ns`, alive, unless it is to be `cut_short`.
+    fn wait_until(&self, until_ns: u64, cut_short: impl Fn() -> bool) {
+        while clock::now_ns() < until_ns && !cut_short() {
             self.shell.page.beat(clock::now_ns());
             clock::sleep_until_ns(until_ns.min(clock::now_ns() + LOOK_NS));
         }
