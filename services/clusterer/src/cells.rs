@@ -12,6 +12,8 @@ const NOBODY: u32 = u32::MAX;
 
 /// How far from a member a cell lies at most, in rings and in columns.
 const REACH: usize = 2;
+/// Columns within reach, the cell's own included.
+const COLUMNS: usize = 2 * REACH + 1;
 /// Columns from two before the sweep to two past it.
 const MOST_SPOTS: usize = MAX_COLUMNS + 2 * REACH;
 
@@ -114,9 +116,14 @@ impl Cells {
         let places = cluster.summary.member_places();
         let (mut low, mut high) = (usize::MAX, 0);
         field.cluster = cluster.summary.key;
+        let mut newest = usize::MAX;
         for r in &output.returns[places.clone()] {
             let spot = usize::from(r.column) + REACH;
             self.members[spot] |= 1 << r.ring;
+            if spot == newest {
+                continue;
+            }
+            newest = spot;
             for near in -(REACH as isize)..=REACH as isize {
                 let near = field.spot(spot, near);
                 self.spots[near / 64] |= 1 << (near % 64);
@@ -139,14 +146,20 @@ impl Cells {
 
     /// The cells of one column, by ring.
     fn fill_spot(&self, field: &Field, spot: usize, output: &mut Clusters) -> bool {
-        let mut near = 0;
-        for columns in -(REACH as isize)..=REACH as isize {
-            near |= self.members_at(field, spot, columns);
-        }
+        let around = self.around(field, spot);
+        let near = around.members.iter().fold(0, |near, members| near | members);
         let mut cells = (near | near << 1 | near << 2 | near >> 1 | near >> 2) & field.ring_bits & !self.members[spot];
+        let axis = field.axis(spot);
         while cells != 0 {
-            let cell = self.cell(field, spot, cells.trailing_zeros() as usize);
-            if output.cells.push(cell).is_err() {
+            let ring = cells.trailing_zeros() as usize;
+            let cell = Cell {
+                azimuth_rad: axis.azimuth_rad(field, ring),
+                range_m: 0.0,
+                column: (spot as u16).wrapping_sub(REACH as u16),
+                ring: ring as u8,
+                kind: CellKind::Unknown,
+            };
+            if output.cells.push(self.seen(field, &around, ring, cell)).is_err() {
                 return false;
             }
             cells &= cells - 1;
@@ -154,29 +167,30 @@ impl Cells {
         true
     }
 
-    fn members_at(&self, field: &Field, spot: usize, columns: isize) -> u64 {
-        field.spot_if_any(spot, columns).map_or(0, |spot| self.members[spot])
+    /// The columns round a spot.
+    fn around(&self, field: &Field, spot: usize) -> Around {
+        let mut around = Around { received: [None; COLUMNS], members: [0; COLUMNS] };
+        for (place, columns) in (-(REACH as isize)..=REACH as isize).enumerate() {
+            if let Some(there) = field.spot_if_any(spot, columns) {
+                around.received[place] = field.received(there);
+                around.members[place] = self.members[there];
+            }
+        }
+        around
     }
 
-    fn cell(&self, field: &Field, spot: usize, ring: usize) -> Cell {
-        let azimuth_rad = field.azimuth_rad(spot, ring);
-        let cell = Cell {
-            azimuth_rad,
-            range_m: 0.0,
-            column: (spot as u16).wrapping_sub(REACH as u16),
-            ring: ring as u8,
-            kind: CellKind::Unknown,
-        };
-        let Some(column) = field.received(spot) else { return cell };
+    /// A cell with what its firing saw.
+    fn seen(&self, field: &Field, around: &Around, ring: usize, cell: Cell) -> Cell {
+        let Some(column) = around.received[REACH] else { return cell };
         let there = self.returns_at(field, ring, column).map(|place| field.seen.returns[place].range_m());
         let Some(range_m) = there.min_by(f32::total_cmp) else { return Cell { kind: CellKind::Miss, ..cell } };
-        let member = self.nearest_member(field, spot, ring);
+        let member = self.nearest_member(field, around, ring);
         let nearer = member.is_some_and(|place| range_m < field.seen.returns[place].range_m());
         Cell { range_m, kind: if nearer { CellKind::Nearer } else { CellKind::Farther }, ..cell }
     }
 
     /// Place of the member nearest to a cell; of those equally near the smallest.
-    fn nearest_member(&self, field: &Field, spot: usize, ring: usize) -> Option<usize> {
+    fn nearest_member(&self, field: &Field, around: &Around, ring: usize) -> Option<usize> {
         let mut best: Option<(isize, usize)> = None;
         for (rings, columns) in NEAREST_FIRST {
             let distance = rings * rings + columns * columns;
@@ -184,10 +198,11 @@ impl Cells {
                 break;
             }
             let Some(ring) = ring.checked_add_signed(rings).filter(|&ring| ring < field.rings) else { continue };
-            if self.members_at(field, spot, columns) & (1 << ring) == 0 {
+            let place = (columns + REACH as isize) as usize;
+            if around.members[place] & (1 << ring) == 0 {
                 continue;
             }
-            let Some(column) = field.spot_if_any(spot, columns).and_then(|spot| field.received(spot)) else { continue };
+            let Some(column) = around.received[place] else { continue };
             let place = self.returns_at(field, ring, column).find(|&place| field.cluster_of[place] == field.cluster);
             best = best.into_iter().chain(place.map(|place| (distance, place))).min();
         }
@@ -260,14 +275,42 @@ impl<'a> Field<'a> {
         self.seen.columns.get(column).filter(|column| column.valid != 0).map(|_| column)
     }
 
-    /// Azimuth of a firing [rad] in [−π, π): its column's and the head's turn since the column's first firing. Past the
-    /// sweep's ends it goes on by the header's step. In an invalid column it is as good as the sweep's; 0 for none.
-    fn azimuth_rad(&self, spot: usize, ring: usize) -> f32 {
+    /// The firings of a spot.
+    fn axis(&self, spot: usize) -> Axis {
         let column = spot.saturating_sub(REACH).min(self.columns - 1);
         let beyond = spot as f32 - (column + REACH) as f32;
-        let turned_rad = self.turn_rad_per_ns * self.seen.rings[ring].offset_ns as f32;
-        let on_rad = self.sense * (beyond * self.seen.header.column_step_rad + turned_rad);
-        let azimuth_rad = (self.seen.columns[column].azimuth_rad + on_rad + PI).rem_euclid(TAU) - PI;
+        let azimuth_rad = self.seen.columns[column].azimuth_rad;
+        Axis { azimuth_rad, beyond_rad: beyond * self.seen.header.column_step_rad }
+    }
+}
+
+/// The columns within two of a spot.
+struct Around {
+    /// Those that were received.
+    received: [Option<usize>; COLUMNS],
+    /// The cluster's members, a bit a ring.
+    members: [u64; COLUMNS],
+}
+
+/// Where a column's firings point.
+struct Axis {
+    /// Of the sweep's column nearest to it.
+    azimuth_rad: f32,
+    /// From there on to the column.
+    beyond_rad: f32,
+}
+
+impl Axis {
+    /// Azimuth of a firing [rad] in [−π, π): its column's and the head's turn since the column's first firing. Past the
+    /// sweep's ends it goes on by the header's step. In an invalid column it is as good as the sweep's; 0 for none.
+    fn azimuth_rad(&self, field: &Field, ring: usize) -> f32 {
+        let turned_rad = field.turn_rad_per_ns * field.seen.rings[ring].offset_ns as f32;
+        let on_rad = field.sense * (self.beyond_rad + turned_rad);
+        let azimuth_rad = match self.azimuth_rad + on_rad + PI {
+            // The remainder is slow, and seldom needed.
+            within if (0.0..TAU).contains(&within) => within,
+            beyond => beyond.rem_euclid(TAU),
+        } - PI;
         match azimuth_rad {
             finite if finite < PI => finite,
             rounded_up if rounded_up.is_finite() => -PI,

@@ -312,18 +312,24 @@ impl Seeker {
     /// The lanes of a chunk whose boxes it overlaps and that are not known to be of its set, a bit each.
     #[inline(always)]
     fn candidates(&self, chunk: &Chunk, root: u32) -> u32 {
-        let is_candidate = |lane: usize| {
-            (chunk.set[lane] != root)
-                & (chunk.low_m[0][lane] <= self.high_m[0])
-                & (chunk.high_m[0][lane] >= self.low_m[0])
-                & (chunk.low_m[1][lane] <= self.high_m[1])
-                & (chunk.high_m[1][lane] >= self.low_m[1])
-                & (chunk.low_m[2][lane] <= self.high_m[2])
-                & (chunk.high_m[2][lane] >= self.low_m[2])
-        };
-        if !(0..LANES).fold(false, |any, lane| any | is_candidate(lane)) {
+        if chunk.set.iter().all(|&set| set == root) {
             return 0;
         }
-        (0..LANES).fold(0, |bits, lane| bits | u32::from(is_candidate(lane)) << lane)
+        // Arrays lane by lane without branches, so that each line is an instruction or two on vectors.
+        let mut apart_m = [f32::NEG_INFINITY; LANES];
+        for axis in 0..3 {
+            let (low_m, high_m) = (&chunk.low_m[axis], &chunk.high_m[axis]);
+            for lane in 0..LANES {
+                apart_m[lane] = max(apart_m[lane], low_m[lane] - self.high_m[axis]);
+            }
+            for lane in 0..LANES {
+                apart_m[lane] = max(apart_m[lane], self.low_m[axis] - high_m[lane]);
+            }
+        }
+        let mut candidates = 0;
+        for lane in 0..LANES {
+            candidates |= u32::from((apart_m[lane] <= 0.0) & (chunk.set[lane] != root)) << lane;
+        }
+        candidates
     }
 }
