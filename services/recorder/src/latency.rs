@@ -19,9 +19,18 @@ impl Latency {
     }
 
     pub(crate) fn record(&mut self, value_ns: u64) {
-        let (_, high) = BOUNDS_NS;
-        self.beyond += u64::from(value_ns > high);
-        self.histogram.saturating_record(value_ns.min(high));
+        self.record_n(value_ns, 1);
+    }
+
+    /// Records the same value `count` times.
+    pub(crate) fn record_n(&mut self, value_ns: u64, count: u64) {
+        self.beyond += if Self::is_beyond(value_ns) { count } else { 0 };
+        self.histogram.saturating_record_n(value_ns.min(BOUNDS_NS.1), count);
+    }
+
+    /// Whether a value counts as an hour only.
+    pub(crate) fn is_beyond(value_ns: u64) -> bool {
+        value_ns > BOUNDS_NS.1
     }
 
     pub(crate) fn snapshot_into(&self, snapshot: &mut LatencySnapshot) {

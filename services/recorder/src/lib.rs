@@ -38,8 +38,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod answers;
 mod assemble;
+mod cause;
 mod detections_json;
+mod history;
 mod labels_csv;
 mod latency;
 mod output;
@@ -49,12 +52,15 @@ mod repair;
 mod segments;
 mod settings;
 mod snapshot;
+mod stage_stats;
 mod stats;
+mod sweeps;
 mod worst;
 mod writer;
 
+pub use answers::Answered;
 pub use latency::{LatencySnapshot, Percentiles};
 pub use recorder::Recorder;
 pub use settings::{MAX_QUEUE_PARTS, RecorderError, Settings};
-pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, VERSION};
-pub use worst::WorstSweep;
+pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, TraceCounts, VERSION};
+pub use worst::{WorstHop, WorstSweep};

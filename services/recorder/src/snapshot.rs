@@ -4,13 +4,16 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use lidar::ObstacleClass;
+use messages::Verdict;
 use serde::{Deserialize, Serialize};
 
+use crate::answers::{self, Answered};
 use crate::latency::LatencySnapshot;
+use crate::stage_stats::Verdicts;
 use crate::worst::{WorstSweep, merge};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// The recorder's statistics at one moment: of one life of its process, or merged, of several.
 ///
@@ -32,6 +35,14 @@ pub struct Snapshot {
     pub first_sweep: Option<u64>,
     /// Number of the last sweep.
     pub last_sweep: Option<u64>,
+    /// Parts between the first and the last that did not come.
+    pub missing_parts: u64,
+    /// Ordinal of the first part.
+    pub first_ordinal: Option<u64>,
+    /// Largest ordinal of a part.
+    pub last_ordinal: Option<u64>,
+    /// Sweeps that were answered (every part came and was used) by the step of degradation at which they were processed.
+    pub steps: BTreeMap<String, u64>,
     /// Duration of the last sweep's turn [ns].
     pub period_ns: Option<u64>,
     /// Accepted returns.
@@ -44,8 +55,13 @@ pub struct Snapshot {
     pub verdicts: BTreeMap<String, u64>,
     /// Sweeps that a failed file lacks.
     pub lost_sweeps: LostSweeps,
-    /// From a sweep's last return to its last detection sent, once a sweep.
+    /// From a sweep's last return to its last detection sent, of every sweep that was answered.
     pub end_to_end: LatencySnapshot,
+    /// The same, and of each sweep without an answer between two that have one the time from its last return to the next
+    /// sweep's last detection sent; paced sources only.
+    pub end_to_end_corrected: LatencySnapshot,
+    /// The ends of the row of sweeps that were answered; paced sources only.
+    pub answered: Option<Answered>,
     /// From a part's last return to its being sent by the source, once a part.
     pub source_late: LatencySnapshot,
     /// From a cluster's last return to its detection sent: at least 5 points, not at the seam, paced sources only.
@@ -58,6 +74,20 @@ pub struct Snapshot {
     pub deadline: Deadline,
     /// The stages in chain order, the source first.
     pub stages: Vec<StageSnapshot>,
+    /// What became of the trace file's events; none where no such file is written.
+    pub trace: Option<TraceCounts>,
+}
+
+/// A trace file in numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TraceCounts {
+    /// Events written, names of processes and threads included.
+    pub events: u64,
+    /// Parts that came and of which there are no events: the writer was behind, or the file had failed.
+    pub lost: u64,
+    /// Whether the file had failed.
+    pub failed: bool,
 }
 
 /// Sweeps that were accepted and not written because the file had failed.
@@ -70,7 +100,8 @@ pub struct LostSweeps {
     pub labels: u64,
 }
 
-/// Sweeps whose end-to-end latency was over the deadline.
+/// Sweeps that were answered after the deadline, or not at all although every part of them came: rejected, and not on
+/// purpose. Those of which parts are missing are the ledger's to name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Deadline {
@@ -78,22 +109,25 @@ pub struct Deadline {
     pub deadline_ms: f64,
     /// Sweeps that missed it.
     pub misses: u64,
-    /// Misses by the longest segment of the sweep's way: `source late`, or a stage and `queued`, `transport`, `busy`.
+    /// Misses by cause, one each: a stage and `late` (the source), `wake-up`, `queueing`, `compute`, `cpu taken`,
+    /// `restart`, or the verdict by which it rejected the sweep.
     pub causes: BTreeMap<String, u64>,
 }
 
-/// One stage's share of the parts' time, once a part.
+/// One stage's share of the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageSnapshot {
     /// Its name.
     pub stage: String,
-    /// From sent (and the stage free) until `process` began; empty for the source.
+    /// From sent (and the stage free) until `process` began, once a part; empty for the source.
     pub transport: LatencySnapshot,
-    /// Sent, and the stage still busy with a part before; empty for the source.
+    /// Sent, and the stage still busy with a part before, once a part; empty for the source.
     pub queued: LatencySnapshot,
-    /// In `process`.
+    /// In `process`, all parts of a sweep together, of every sweep that was answered.
     pub busy: LatencySnapshot,
+    /// In `process`, once a part.
+    pub busy_part: LatencySnapshot,
     /// Parts by verdict, other than complete.
     pub verdicts: BTreeMap<String, u64>,
 }
@@ -183,6 +217,13 @@ impl Snapshot {
             self.sweeps -= u64::from(first == last);
             self.missing_sweeps += first.saturating_sub(last.saturating_add(1));
         }
+        if let (Some(last), Some(first)) = (self.last_ordinal, later.first_ordinal) {
+            self.missing_parts += first.saturating_sub(last.saturating_add(1));
+        }
+        self.missing_parts += later.missing_parts;
+        self.first_ordinal = self.first_ordinal.or(later.first_ordinal);
+        self.last_ordinal = self.last_ordinal.max(later.last_ordinal);
+        add(&mut self.steps, &later.steps);
         self.complete_sweeps += later.complete_sweeps;
         self.missing_sweeps += later.missing_sweeps;
         self.first_sweep = self.first_sweep.or(later.first_sweep);
@@ -195,6 +236,10 @@ impl Snapshot {
         self.lost_sweeps.detections += later.lost_sweeps.detections;
         self.lost_sweeps.labels += later.lost_sweeps.labels;
         self.end_to_end.merge(&later.end_to_end);
+        answers::merge(
+            (&mut self.end_to_end_corrected, &mut self.answered),
+            (&later.end_to_end_corrected, later.answered),
+        );
         self.source_late.merge(&later.source_late);
         self.obstacle.merge(&later.obstacle);
         self.seam.merge(&later.seam);
@@ -205,14 +250,22 @@ impl Snapshot {
             stage.transport.merge(&later.transport);
             stage.queued.merge(&later.queued);
             stage.busy.merge(&later.busy);
+            stage.busy_part.merge(&later.busy_part);
             add(&mut stage.verdicts, &later.verdicts);
+        }
+        if let Some(later) = later.trace {
+            let trace = self.trace.get_or_insert_default();
+            trace.events += later.events;
+            trace.lost += later.lost;
+            trace.failed |= later.failed;
         }
         Ok(())
     }
 
-    /// Share of the deadline that 99.9 % of the sweeps leave free [%]; negative past it, none before the first sweep.
+    /// Share of the deadline that 99.9 % of the sweeps leave free [%], those without an answer included; negative past
+    /// it, none before the first answer and without pace.
     pub fn margin_p999_pct(&self) -> Option<f64> {
-        let p999 = self.end_to_end.percentiles().p999?;
+        let p999 = self.end_to_end_corrected.percentiles().p999?;
         Some((self.deadline.deadline_ms - p999) / self.deadline.deadline_ms * 100.0)
     }
 }
@@ -223,6 +276,13 @@ pub(crate) fn count(names: &mut BTreeMap<String, u64>, name: &str, number: u64) 
         Some(count) => *count = number,
         None if number > 0 => drop(names.insert(name.to_owned(), number)),
         None => {}
+    }
+}
+
+/// Verdicts other than `Complete`, which is every other part.
+pub(crate) fn count_verdicts(names: &mut BTreeMap<String, u64>, verdicts: &Verdicts) {
+    for verdict in Verdict::ALL.into_iter().filter(|&verdict| verdict != Verdict::Complete) {
+        count(names, verdict.name(), verdicts[verdict as usize]);
     }
 }
 

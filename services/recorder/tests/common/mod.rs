@@ -167,9 +167,9 @@ fn solid_of(place: usize) -> Solid {
 
 /// A trace of four hops: 1 ms late, then 100 µs of transport and 2 ms of work each.
 pub fn trace(part: Part) -> Trace {
-    let due_ns =
-        1_000_000_000 + 100_000_000 * part.sweep + 100_000_000 * (u64::from(part.sector) + 1) / u64::from(part.sectors);
-    let mut trace = Trace { part, due_ns, ..Trace::default() };
+    let sweep_start_ns = 1_000_000_000 + 100_000_000 * part.sweep;
+    let due_ns = sweep_start_ns + 100_000_000 * (u64::from(part.sector) + 1) / u64::from(part.sectors);
+    let mut trace = Trace { part, due_ns, sweep_start_ns, ..Trace::default() };
     let mut sent_ns = due_ns + 1_000_000;
     trace.push(Hop { started_ns: due_ns, finished_ns: sent_ns, ..Hop::default() });
     for stage in 1..4 {
