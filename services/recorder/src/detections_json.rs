@@ -1,7 +1,7 @@
 //! Sweep → one JSON line. Numbers are the shortest that read back as the same value, so equal sweeps are equal bytes.
 
 use lidar::ObstacleClass;
-use messages::{Detection, Refusal, Solid};
+use messages::{Detection, Refusal, Solid, Step};
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 
@@ -14,6 +14,7 @@ pub(crate) fn write_line(sweep: &SweepRows, line: &mut Vec<u8>) -> Result<(), se
         &Line {
             sweep: sweep.part.sweep,
             complete: sweep.complete,
+            step: Some(sweep.part.step()).filter(|&step| step != Step::Nominal).map(Step::name),
             sensor_time_ns: sweep.part.sensor_time_ns,
             returns: sweep.accepted,
             refused: Refused(&sweep.refused),
@@ -30,6 +31,8 @@ pub(crate) fn write_line(sweep: &SweepRows, line: &mut Vec<u8>) -> Result<(), se
 struct Line<'a> {
     sweep: u64,
     complete: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step: Option<&'static str>,
     sensor_time_ns: u64,
     returns: u64,
     refused: Refused<'a>,
@@ -142,6 +145,16 @@ mod tests {
             line(&sweep),
             "{\"sweep\":7,\"complete\":true,\"sensor_time_ns\":0,\"returns\":0,\"refused\":{},\"detections\":[]}\n"
         );
+    }
+
+    #[test]
+    fn a_line_names_its_step_only_when_something_was_left_out() {
+        let at = |step| {
+            let part = Part { sweep: 7, step, ..Part::default() };
+            line(&SweepRows { part, complete: true, ..SweepRows::default() })
+        };
+        assert!(!at(0).contains("step"));
+        assert!(at(1).starts_with("{\"sweep\":7,\"complete\":true,\"step\":\"fewer-starts\",\"sensor_time_ns\":0,"));
     }
 
     #[test]
