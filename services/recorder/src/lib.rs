@@ -16,6 +16,7 @@
 //! let settings = Settings {
 //!     detections: Some("/dev/null".into()),
 //!     labels: None,
+//!     trace: None,
 //!     statistics: None,
 //!     resume: false,
 //!     queue_parts: 4,
@@ -49,12 +50,15 @@ mod output;
 mod part_rows;
 mod recorder;
 mod repair;
+mod repair_trace;
 mod segments;
 mod settings;
 mod snapshot;
 mod stage_stats;
 mod stats;
 mod sweeps;
+mod trace_events;
+mod trace_file;
 mod worst;
 mod writer;
 

@@ -41,7 +41,9 @@ pub(crate) struct Output {
 pub(crate) struct Failure {
     pub(crate) path: PathBuf,
     pub(crate) error: io::Error,
-    pub(crate) lost_sweeps: u64,
+    /// How much of `what` it lacks.
+    pub(crate) lost: u64,
+    pub(crate) what: &'static str,
 }
 
 impl Output {
@@ -136,7 +138,7 @@ impl Output {
     }
 
     fn close(&mut self, error: io::Error, sweep: Option<u64>) {
-        tracing::error!(file = %self.path.display(), sweep, %error, "output closed, its sweeps are lost from here on");
+        tracing::error!(file = %self.path.display(), sweep, %error, "output closed, what it should hold is lost from here on");
         if let Target::Regular(file, length) = &self.target {
             // The torn block; when even that fails, a reader finds it as after a crash.
             let _ = file.set_len(*length);
@@ -147,7 +149,7 @@ impl Output {
     /// Closes the file; what it failed of, if it did.
     pub(crate) fn end(self) -> Option<Failure> {
         match self.target {
-            Target::Closed(error) => Some(Failure { path: self.path, error, lost_sweeps: self.lost_sweeps }),
+            Target::Closed(error) => Some(Failure { path: self.path, error, lost: self.lost_sweeps, what: "sweeps" }),
             _ => None,
         }
     }

@@ -9,11 +9,13 @@ use stage::{Settled, Sink, SinkError};
 
 use crate::output::{Commit, Failure, Output};
 use crate::part_rows::{PartRows, is_coherent};
-use crate::repair;
 use crate::settings::{RecorderError, Settings};
 use crate::snapshot::Snapshot;
 use crate::stats::Statistics;
+use crate::trace_events::Traced;
+use crate::trace_file::TraceLine;
 use crate::writer::{Progress, Writer};
+use crate::{repair, repair_trace};
 
 /// The chain's ledgered sink: detections and labels as files, latencies as statistics.
 ///
@@ -22,6 +24,8 @@ pub struct Recorder {
     statistics: Statistics,
     /// The way to the writer; none when nothing is written, or after `finish`.
     line: Option<Line>,
+    /// The way to the trace file, where one is written.
+    trace: Option<TraceLine>,
     progress: Arc<Progress>,
     lossless: bool,
     with_members: bool,
@@ -39,7 +43,8 @@ struct Line {
 }
 
 impl Recorder {
-    /// Opens the files, allocates every buffer and starts the writer thread (none where there is no file).
+    /// Opens the files, allocates every buffer and starts the writer threads: one for detections and labels, one for the
+    /// trace file, each where there is such a file.
     ///
     /// With `resume`, what a killed process left torn at a file's end is cut, and writing goes on from there.
     /// A named pipe is opened when the first sweep is written, because opening waits for a reader.
@@ -50,7 +55,8 @@ impl Recorder {
         settings.check()?;
         let statistics = Statistics::new(&settings)?;
         let progress = Arc::new(Progress::new(settled));
-        let (detections, labels) = open_outputs(&settings)?;
+        let Outputs { detections, labels, trace } = open_outputs(&settings)?;
+        let trace = trace.map(|output| TraceLine::start(output, &settings.stages, settings.lossless)).transpose()?;
         let with_members = labels.is_some();
         let line = if detections.is_none() && labels.is_none() {
             None
@@ -61,6 +67,7 @@ impl Recorder {
         Ok(Self {
             statistics,
             line,
+            trace,
             progress,
             lossless: settings.lossless,
             with_members,
@@ -75,6 +82,7 @@ impl Recorder {
         self.statistics.snapshot_into(snapshot);
         snapshot.lost_sweeps.detections = self.progress.lost_detections.load(Ordering::Relaxed);
         snapshot.lost_sweeps.labels = self.progress.lost_labels.load(Ordering::Relaxed);
+        snapshot.trace = self.trace.as_ref().map(TraceLine::counts);
     }
 
     fn take(&mut self, trace: &Trace, input: &Detections) -> Verdict {
@@ -123,7 +131,10 @@ impl Sink for Recorder {
     /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members or solids out of place.
     fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
         let verdict = self.take(trace, input);
-        self.statistics.add(trace, input, verdict);
+        let answer = self.statistics.add(trace, input, verdict);
+        if let Some(line) = &self.trace {
+            line.send(Traced { trace: *trace, answer });
+        }
         verdict
     }
 
@@ -140,16 +151,29 @@ impl Sink for Recorder {
     /// Waits until everything is written: for as long as a pipe's reader takes. A second call does nothing.
     fn finish(&mut self) -> Result<(), SinkError> {
         self.finished = true;
-        let Some(Line { queue, free, writer }) = self.line.take() else { return self.checkpoint() };
-        drop(queue);
-        let failures = writer.join().map_err(|_| SinkError("the recorder's writer thread panicked".to_owned()))?;
-        drop(free);
+        let panicked = |_| SinkError("a writer thread of the recorder panicked".to_owned());
+        let mut failures = Vec::new();
+        if let Some(Line { queue, free, writer }) = self.line.take() {
+            drop(queue);
+            failures = writer.join().map_err(panicked)?;
+            drop(free);
+        }
+        if let Some(line) = &mut self.trace {
+            failures.extend(line.finish().map_err(panicked)?);
+        }
         self.checkpoint()?;
         if failures.is_empty() { Ok(()) } else { Err(SinkError(tell(&failures))) }
     }
 }
 
-fn open_outputs(settings: &Settings) -> Result<(Option<Output>, Option<Output>), RecorderError> {
+/// The files of the settings.
+struct Outputs {
+    detections: Option<Output>,
+    labels: Option<Output>,
+    trace: Option<Output>,
+}
+
+fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
     let mut whole = None;
     let detections = settings.detections.as_deref().map(|path| match settings.resume {
         false => Output::create(path, Commit::LastByte),
@@ -165,16 +189,27 @@ fn open_outputs(settings: &Settings) -> Result<(Option<Output>, Option<Output>),
         true => Output::resume(path, Commit::FirstByte, |file| Ok(repair::labels(path, file, whole)?.length)),
     });
     let labels = labels.transpose()?;
-    match (&detections, &labels, &settings.labels) {
-        (Some(one), Some(other), Some(path)) if one.is_same_file(other) => Err(RecorderError::SameFile(path.clone())),
-        _ => Ok((detections, labels)),
+    let trace = settings.trace.as_deref().map(|path| match settings.resume {
+        false => Output::create(path, Commit::LastByte),
+        true => Output::resume(path, Commit::LastByte, |file| repair_trace::trace(path, file)),
+    });
+    let trace = trace.transpose()?;
+    let is_same = |one: &Option<Output>, other: &Option<Output>| {
+        one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one.is_same_file(other))
+    };
+    if is_same(&detections, &labels) {
+        return Err(RecorderError::SameFile(settings.labels.clone().unwrap_or_default()));
     }
+    if is_same(&detections, &trace) || is_same(&labels, &trace) {
+        return Err(RecorderError::SameFile(settings.trace.clone().unwrap_or_default()));
+    }
+    Ok(Outputs { detections, labels, trace })
 }
 
 fn tell(failures: &[Failure]) -> String {
     let line = |failure: &Failure| {
-        let Failure { path, error, lost_sweeps } = failure;
-        format!("{}: {error}: {lost_sweeps} sweeps lost", path.display())
+        let Failure { path, error, lost, what } = failure;
+        format!("{}: {error}: {lost} {what} lost", path.display())
     };
     let lines: Vec<String> = failures.iter().map(line).collect();
     format!("{}; make room or give another path", lines.join("; "))

@@ -77,7 +77,7 @@ pub(crate) fn labels(path: &Path, file: &File, detections: Option<Whole>) -> Res
     }
 }
 
-const FIRST_SPAN: u64 = 1 << 16;
+pub(crate) const FIRST_SPAN: u64 = 1 << 16;
 
 /// What a crash leaves of the header, written like rows: its first byte last.
 const TORN_HEADER: &[u8] = b"\0weep,return,cluster\n";
@@ -142,7 +142,7 @@ fn after_last_newline(bytes: &[u8]) -> Option<usize> {
 }
 
 /// A file without a whole line: nothing of it is kept if it is the beginning of ours.
-fn not_begun(
+pub(crate) fn not_begun(
     path: &Path,
     kind: &'static str,
     bytes: &[u8],
@@ -151,19 +151,19 @@ fn not_begun(
     if bytes.is_empty() || ours(bytes) { Ok(Whole::default()) } else { Err(foreign(path, kind, bytes)) }
 }
 
-fn foreign(path: &Path, kind: &'static str, line: &[u8]) -> RecorderError {
+pub(crate) fn foreign(path: &Path, kind: &'static str, line: &[u8]) -> RecorderError {
     let shown = &line[..line.len().min(40)];
     RecorderError::Foreign { path: path.to_owned(), kind, found: String::from_utf8_lossy(shown).trim_end().to_owned() }
 }
 
 /// The last `span` bytes, or all, and where they begin.
-fn read_tail(path: &Path, file: &File, span: u64) -> Result<(u64, Vec<u8>), RecorderError> {
+pub(crate) fn read_tail(path: &Path, file: &File, span: u64) -> Result<(u64, Vec<u8>), RecorderError> {
     let length = file.metadata().map_err(|source| unreadable(path, source))?.len();
     read_from(path, file, length.saturating_sub(span), span)
 }
 
 /// Up to `span` bytes from `from` on.
-fn read_from(path: &Path, file: &File, from: u64, span: u64) -> Result<(u64, Vec<u8>), RecorderError> {
+pub(crate) fn read_from(path: &Path, file: &File, from: u64, span: u64) -> Result<(u64, Vec<u8>), RecorderError> {
     let length = file.metadata().map_err(|source| unreadable(path, source))?.len();
     let mut bytes = vec![0; span.min(length.saturating_sub(from)) as usize];
     file.read_exact_at(&mut bytes, from).map_err(|source| unreadable(path, source))?;

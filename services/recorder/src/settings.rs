@@ -13,6 +13,8 @@ pub struct Settings {
     pub detections: Option<PathBuf>,
     /// File for one CSV row a recorded return; as above.
     pub labels: Option<PathBuf>,
+    /// File for the way of every part in the Trace Event Format (a JSON array); as above.
+    pub trace: Option<PathBuf>,
     /// File for the statistics of this life, renewed with every checkpoint.
     pub statistics: Option<PathBuf>,
     /// Go on with the files that an earlier life of this process left, instead of starting them anew.
@@ -56,13 +58,13 @@ pub enum RecorderError {
     Foreign {
         /// As given.
         path: PathBuf,
-        /// What the file should hold: "detections" or "labels".
+        /// What the file should hold: "detections", "labels" or "a trace".
         kind: &'static str,
         /// Beginning of the line that does not fit.
         found: String,
     },
-    /// Detections and labels would overwrite each other.
-    #[error("detections and labels are both {}, must be two files", .0.display())]
+    /// Two outputs would overwrite each other.
+    #[error("two of detections, labels and trace are {}, must be files of their own", .0.display())]
     SameFile(PathBuf),
     /// The number of buffers is out of range.
     #[error("queue_parts is {0}, must be 1 to {MAX_QUEUE_PARTS}")]
@@ -93,12 +95,15 @@ impl Settings {
         if !(self.deadline_ms > 0.0 && self.deadline_ms <= 3_600_000.0) {
             return Err(RecorderError::Deadline(self.deadline_ms));
         }
-        match (&self.detections, &self.labels) {
-            (Some(one), Some(other)) if one == other && !is_null(one) || is_stdout(one) && is_stdout(other) => {
-                Err(RecorderError::SameFile(one.clone()))
+        let outputs = [&self.detections, &self.labels, &self.trace];
+        for (place, one) in outputs.iter().enumerate() {
+            for (one, other) in outputs[..place].iter().filter_map(|other| one.as_ref().zip(other.as_ref())) {
+                if one == other && !is_null(one) || is_stdout(one) && is_stdout(other) {
+                    return Err(RecorderError::SameFile(one.clone()));
+                }
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 }
 
@@ -119,6 +124,7 @@ mod tests {
         Settings {
             detections: Some("a".into()),
             labels: Some("b".into()),
+            trace: Some("c".into()),
             statistics: None,
             resume: false,
             queue_parts: 1,
@@ -147,9 +153,11 @@ mod tests {
     #[test]
     fn two_outputs_to_one_place_are_refused() {
         assert!(matches!(Settings { labels: Some("a".into()), ..sut() }.check(), Err(RecorderError::SameFile(_))));
+        assert!(matches!(Settings { trace: Some("b".into()), ..sut() }.check(), Err(RecorderError::SameFile(_))));
         let both = Settings { detections: Some("-".into()), labels: Some("/dev/stdout".into()), ..sut() };
         assert!(matches!(both.check(), Err(RecorderError::SameFile(_))));
-        let nowhere = Settings { detections: Some("/dev/null".into()), labels: Some("/dev/null".into()), ..sut() };
+        let null = || Some("/dev/null".into());
+        let nowhere = Settings { detections: null(), labels: null(), trace: null(), ..sut() };
         assert!(nowhere.check().is_ok());
     }
 }

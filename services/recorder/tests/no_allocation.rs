@@ -8,7 +8,7 @@ use std::os::unix::fs::OpenOptionsExt;
 
 use common::{HandMade, settings, start};
 use messages::Verdict;
-use recorder::Settings;
+use recorder::{Settings, Snapshot};
 use rustix::fs::{CWD, Mode, OFlags, mkfifoat};
 use stage::Sink;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -27,6 +27,7 @@ fn accepting_and_rejecting_parts_allocates_nothing() {
     let of = Settings {
         detections: Some("/dev/null".into()),
         labels: Some(path),
+        trace: Some("/dev/full".into()),
         lossless: false,
         queue_parts: 4,
         ..settings()
@@ -35,10 +36,15 @@ fn accepting_and_rejecting_parts_allocates_nothing() {
     let (trace, large) = HandMade::interleaved(0, 50_000, 400, 100).whole();
     let (_, alone) = HandMade::interleaved(0, 50_000, 50_000, 100).whole();
 
-    // Once rows are in the pipe, the writer has formatted them all and hangs in writing: nobody else allocates then.
+    // Once rows are in the pipe, the writer has formatted them all and hangs in writing; the trace has
+    // failed: nobody else allocates then.
     assert_eq!(recorder.accept(&trace, &large), Verdict::Complete);
     let header = "sweep,return,cluster\n".len() as u64;
-    let written = || rustix::io::ioctl_fionread(&reader).unwrap() > header;
+    let mut snapshot = Snapshot::default();
+    let mut written = || {
+        recorder.snapshot_into(&mut snapshot);
+        rustix::io::ioctl_fionread(&reader).unwrap() > header && snapshot.trace.is_some_and(|trace| trace.lost == 1)
+    };
     assert!((0..6_000).any(|_| {
         std::thread::sleep(std::time::Duration::from_millis(10));
         written()

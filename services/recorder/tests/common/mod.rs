@@ -53,6 +53,7 @@ pub fn settings() -> Settings {
     Settings {
         detections: None,
         labels: None,
+        trace: None,
         statistics: None,
         resume: false,
         queue_parts: 4,
