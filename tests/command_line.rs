@@ -7,6 +7,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
+use serde_json::Value;
 use support::{Run, encke, sum, text};
 
 /// Runs `encke` and expects it to refuse: exit 2, one line that holds all of `words`.
@@ -143,6 +144,31 @@ fn wrong_words_on_the_command_line_are_refused_with_usage() {
     refused_in_one_line(&["run", "--sensor", "vlp-16"], &["--sensor", "recording"]);
     refused_in_one_line(&["run", "--from", "Cargo.toml.none", "--seed", "3"], &["Cargo.toml.none"]);
     refused_in_one_line(&["run", "--from", "tests", "--seed", "3"], &["--seed", "scene"]);
+}
+
+#[test]
+fn a_trace_follows_every_sweep_through_every_stage() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("trace.json");
+    let run = Run::new(&["--sweeps", "5", "--pace", "fast", "--trace", path.to_str().unwrap()]).finish().expect_code(0);
+    let events: Vec<Value> = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let of = |phase: &str| events.iter().filter(move |event| event["ph"] == phase).collect::<Vec<_>>();
+    let names: Vec<_> =
+        of("M").iter().filter(|e| e["name"] == "process_name").map(|e| e["args"]["name"].clone()).collect();
+    assert_eq!(names, ["source", "clusterer", "extractor", "classifier", "recorder"]);
+    for sweep in 0..5 {
+        let flow = |phase: &str| of(phase).iter().filter(|event| event["id"] == sweep).count();
+        assert_eq!((flow("s"), flow("t"), flow("f")), (1, 2, 1), "sweep {sweep}");
+        let worked = |name: &str| of("X").iter().filter(|e| e["name"] == name && e["args"]["sweep"] == sweep).count();
+        let sectors = run.report["sectors"].as_u64().unwrap() as usize;
+        assert_eq!((worked("make"), worked("process")), (sectors, 3 * sectors), "sweep {sweep}");
+    }
+    assert_eq!(run.report["trace"]["events"], events.len());
+    assert_eq!((&run.report["trace"]["lost"], &run.report["trace"]["missing"]), (&0.into(), &0.into()));
+    assert_eq!(run.report["worst_sweeps"][0]["hops"].as_array().unwrap().len(), 4);
+    assert!(run.stdout().contains("slowest sweeps") && run.stdout().contains("0 parts lost"), "{}", run.stdout());
+    let (trace, both) = (path.to_str().unwrap(), ["--trace", "--detections"]);
+    refused_in_one_line(&["run", "--detections", trace, "--trace", trace], &both);
 }
 
 #[test]

@@ -55,6 +55,7 @@ const RUN_EXAMPLES: &str = "Examples:
   encke run --from capture.pcap --detections d.jsonl --labels l.csv
   encke run --from config/scenes/ring-crossing.toml --duration 60s --report report.json
   encke run --from sweeps/ --pace fast             as fast as it goes, nothing dropped
+  encke run --duration 10s --trace trace.json      open the file in ui.perfetto.dev
 
 Ctrl-C and SIGTERM stop the chain in order, drain it, and print the summary.";
 
@@ -147,6 +148,9 @@ pub(crate) struct RunArgs {
     /// Write the cluster of every return: sweep,return,cluster; - is standard output.
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) labels: Option<PathBuf>,
+    /// Write the way of every part through the stages, for ui.perfetto.dev; - is standard output.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) trace: Option<PathBuf>,
     /// Write the summary as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,

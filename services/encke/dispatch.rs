@@ -178,6 +178,7 @@ fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
     let settings = Settings {
         detections: plan.outputs.detections.clone(),
         labels: plan.outputs.labels.clone(),
+        trace: plan.outputs.trace.clone(),
         statistics: Some(Plan::snapshot_path(shell.instance(), shell.incarnation())),
         resume: shell.incarnation() > 1,
         queue_parts: WRITER_QUEUE_PARTS.max(plan.chain.queue_parts()),

@@ -24,6 +24,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let files = [
         ("--detections", plan.outputs.detections.as_deref()),
         ("--labels", plan.outputs.labels.as_deref()),
+        ("--trace", plan.outputs.trace.as_deref()),
         ("--report", args.report.as_deref()),
     ];
     outputs::check(&files, &plan.source.from)?;
@@ -85,7 +86,11 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
         pace: args.pace.into(),
         sweeps,
         duration_ns,
-        outputs: Outputs { detections: absolute(&args.detections)?, labels: absolute(&args.labels)? },
+        outputs: Outputs {
+            detections: absolute(&args.detections)?,
+            labels: absolute(&args.labels)?,
+            trace: absolute(&args.trace)?,
+        },
         config_dirs: assets.dirs().to_vec(),
         chain,
     })

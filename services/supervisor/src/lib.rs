@@ -24,7 +24,7 @@ pub use house::{Running, running_instances, stage_process};
 pub use ledger::{GapReport, HopReport, LedgerReport};
 pub use overload::{Move, OverloadReport};
 pub use processes::ProcessReport;
-pub use report::{DeadlineReport, LatencyReport, Report, StageLatency};
+pub use report::{DeadlineReport, LEAST_MARGIN_PCT, LatencyReport, Report, StageLatency, TraceReport};
 pub use status::{StageStatus, Status, status};
 pub use summary::summary;
 pub use watch::{Settings, run};

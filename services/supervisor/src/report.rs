@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lidar::ObstacleClass;
 use recorder::{LostSweeps, Percentiles, Snapshot, WorstSweep};
@@ -40,10 +40,10 @@ pub struct Report {
     pub seam_latency_ms: Percentiles,
     /// Misses and what caused them.
     pub deadline: DeadlineReport,
-    /// Overruns, slips, and what was left out under overload.
-    pub overload: OverloadReport,
-    /// The sweeps that took longest, longest first.
+    /// The sweeps that took longest, longest first, each with the way of its last part.
     pub worst_sweeps: Vec<WorstSweep>,
+    /// Sweeps that were answered, by the step of degradation at which they were processed.
+    pub steps: BTreeMap<String, u64>,
     /// The processes, the source first, the supervisor last.
     pub processes: Vec<ProcessReport>,
     /// Detections by class.
@@ -56,15 +56,33 @@ pub struct Report {
     pub complete_sweeps: u64,
     /// Sweeps that a file lacks because it could not be written.
     pub lost_sweeps: LostSweeps,
+    /// The trace file in numbers, where one was written.
+    pub trace: Option<TraceReport>,
     /// Why the run stopped before its end, where it did.
     pub stopped: Option<String>,
+}
+
+/// The trace file in numbers. A part has about three events in each stage.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct TraceReport {
+    /// Events in the file.
+    pub events: u64,
+    /// Parts that came to the recorder and have no events: its writer was behind, or the file had failed.
+    pub lost: u64,
+    /// Parts that never came to the recorder.
+    pub missing: u64,
+    /// Whether the file had failed.
+    pub failed: bool,
 }
 
 /// Where the time went.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct LatencyReport {
-    /// From a sweep's last return to its last detection sent.
+    /// From a sweep's last return to its last detection sent, of every sweep that was answered.
     pub end_to_end: Percentiles,
+    /// The same, and for each sweep without an answer the time from its last return to the next answer; at the sensor's
+    /// pace only.
+    pub end_to_end_corrected: Percentiles,
     /// By stage.
     pub stages: BTreeMap<String, StageLatency>,
 }
@@ -72,12 +90,14 @@ pub struct LatencyReport {
 /// One stage's share.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct StageLatency {
-    /// From sent (and the stage free) until `process` began.
+    /// From sent (and the stage free) until `process` began, once a part.
     pub transport: Percentiles,
-    /// Sent, and the stage still busy with the part before.
+    /// Sent, and the stage still busy with the part before, once a part.
     pub queued: Percentiles,
-    /// In `process`.
+    /// In `process`, all parts of a sweep together.
     pub busy: Percentiles,
+    /// In `process`, once a part.
+    pub busy_part: Percentiles,
 }
 
 /// Sweeps that came late or not at all.
@@ -85,13 +105,18 @@ pub struct StageLatency {
 pub struct DeadlineReport {
     /// From a sweep's last return to its last detection sent [ms].
     pub deadline_ms: f64,
-    /// Sweeps that missed it: late, dropped or lost.
+    /// Sweeps that missed it: late, rejected (unless on purpose), dropped or lost.
     pub misses: u64,
-    /// Share of the deadline that 99.9 % of the sweeps leave free [%].
+    /// Share of the deadline that 99.9 % of the sweeps leave free [%], by the corrected distribution.
     pub margin_p999_pct: Option<f64>,
-    /// Misses by cause.
+    /// Whether that is at least [`LEAST_MARGIN_PCT`].
+    pub margin_ok: Option<bool>,
+    /// Misses by cause, one each: a stage and what it was late by.
     pub causes: BTreeMap<String, u64>,
 }
+
+/// Margin of the deadline that flight software keeps at its worst [%].
+pub const LEAST_MARGIN_PCT: f64 = 30.0;
 
 /// What the supervisor knows at the end.
 pub(crate) struct Facts<'a> {
@@ -113,6 +138,7 @@ impl Report {
                 transport: stage.transport.percentiles(),
                 queued: stage.queued.percentiles(),
                 busy: stage.busy.percentiles(),
+                busy_part: stage.busy_part.percentiles(),
             };
             (stage.stage.clone(), latency)
         });
@@ -126,12 +152,17 @@ impl Report {
             cluster_range_m: cluster_range_m(plan),
             period_ms: snapshot.period_ns.map(|period_ns| period_ns as f64 / 1e6),
             duration_s,
-            latency_ms: LatencyReport { end_to_end: snapshot.end_to_end.percentiles(), stages: stages.collect() },
+            latency_ms: LatencyReport {
+                end_to_end: snapshot.end_to_end.percentiles(),
+                end_to_end_corrected: snapshot.end_to_end_corrected.percentiles(),
+                stages: stages.collect(),
+            },
             obstacle_latency_ms: snapshot.obstacle.percentiles(),
             seam_latency_ms: snapshot.seam.percentiles(),
             deadline: deadline(plan, &snapshot, &ledger),
             overload,
             worst_sweeps: snapshot.worst,
+            steps: snapshot.steps,
             processes,
             detections: ObstacleClass::ALL
                 .into_iter()
@@ -141,6 +172,12 @@ impl Report {
             refused: snapshot.refused,
             complete_sweeps: snapshot.complete_sweeps,
             lost_sweeps: snapshot.lost_sweeps,
+            trace: snapshot.trace.map(|trace| TraceReport {
+                events: trace.events,
+                lost: trace.lost,
+                missing: snapshot.missing_parts,
+                failed: trace.failed,
+            }),
             ledger,
             stopped,
         }
@@ -175,6 +212,9 @@ impl Report {
         if detections + labels > 0 {
             return Some(format!("a file failed: detections lack {detections} sweeps, labels {labels}"));
         }
+        if let Some(TraceReport { lost, failed: true, .. }) = self.trace {
+            return Some(format!("a file failed: the trace lacks {lost} parts"));
+        }
         if missing > 0 && (strict || self.pace == Pace::Fast) {
             return Some(format!("{missing} parts were dropped or lost"));
         }
@@ -185,7 +225,7 @@ impl Report {
     }
 }
 
-/// Late sweeps as the sink saw them; dropped and lost ones never had an answer, so they missed it too.
+/// Late and rejected sweeps as the sink saw them; dropped and lost ones never had an answer, so they missed it too.
 fn deadline(plan: &Plan, snapshot: &Snapshot, ledger: &LedgerReport) -> DeadlineReport {
     let deadline_ms = plan.chain.deadline_ms;
     if plan.pace == Pace::Fast {
@@ -193,15 +233,40 @@ fn deadline(plan: &Plan, snapshot: &Snapshot, ledger: &LedgerReport) -> Deadline
     }
     let mut causes = snapshot.deadline.causes.clone();
     let mut misses = snapshot.deadline.misses;
+    for (cause, sweeps) in missing_sweeps(ledger, plan.chain.sectors) {
+        *causes.entry(cause).or_default() += sweeps;
+        misses += sweeps;
+    }
+    let margin_p999_pct = snapshot.margin_p999_pct();
+    let margin_ok = margin_p999_pct.map(|margin| margin >= LEAST_MARGIN_PCT);
+    DeadlineReport { deadline_ms, misses, margin_p999_pct, margin_ok, causes }
+}
+
+/// Sweeps of which parts are missing, each once, by the first hop on the way that missed one and how.
+///
+/// A gap names the parts at its ends, and how many are missing on this hop; what was missing before is not counted
+/// again. The pages keep the latest gaps by name; older ones count as the fewest sweeps that their parts can be.
+fn missing_sweeps(ledger: &LedgerReport, sectors: u32) -> BTreeMap<String, u64> {
+    let mut causes = BTreeMap::new();
+    let mut counted = BTreeSet::new();
     for hop in &ledger.hops {
-        for (cause, parts) in [("dropped", hop.dropped.values().sum()), ("lost", hop.lost)] {
-            if parts > 0 {
-                *causes.entry(format!("{} {cause}", hop.stage)).or_default() += parts;
-                misses += parts;
+        for (kind, parts) in [("dropped", hop.dropped.values().sum::<u64>()), ("lost", hop.lost)] {
+            let mut sweeps = 0;
+            let mut unnamed = parts;
+            for gap in ledger.gaps.iter().filter(|gap| gap.stage == hop.stage && gap.kind == kind) {
+                unnamed = unnamed.saturating_sub(gap.parts);
+                let new = (gap.first_sweep..=gap.last_sweep).filter(|sweep| !counted.contains(sweep));
+                let new: Vec<u64> = new.take(usize::try_from(gap.parts).unwrap_or(usize::MAX)).collect();
+                sweeps += new.len() as u64;
+                counted.extend(new);
+            }
+            sweeps += unnamed.div_ceil(u64::from(sectors.max(1)));
+            if sweeps > 0 {
+                causes.insert(format!("{} {kind}", hop.stage), sweeps);
             }
         }
     }
-    DeadlineReport { deadline_ms, misses, margin_p999_pct: snapshot.margin_p999_pct(), causes }
+    causes
 }
 
 fn cluster_range_m(plan: &Plan) -> Option<f64> {
@@ -220,4 +285,60 @@ fn machine() -> String {
         system.sysname().to_string_lossy(),
         system.release().to_string_lossy()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ledger::{GapReport, HopReport};
+
+    fn hop(stage: &str, dropped: u64, lost: u64) -> HopReport {
+        HopReport {
+            stage: stage.to_owned(),
+            published: 100,
+            received: 100 - dropped - lost,
+            processed: 100 - dropped - lost,
+            rejected: BTreeMap::new(),
+            dropped: BTreeMap::from([("overflow".to_owned(), dropped)]),
+            lost,
+            in_flight: 0,
+            open: 0,
+        }
+    }
+
+    fn gap(stage: &str, kind: &str, first_sweep: u64, last_sweep: u64, parts: u64) -> GapReport {
+        GapReport { stage: stage.to_owned(), kind: kind.to_owned(), first_sweep, last_sweep, parts }
+    }
+
+    fn missing(hops: Vec<HopReport>, gaps: Vec<GapReport>, sectors: u32) -> Vec<(String, u64)> {
+        missing_sweeps(&LedgerReport { closed: true, hops, gaps }, sectors).into_iter().collect()
+    }
+
+    #[test]
+    fn a_sweep_is_missing_once_whatever_number_of_its_parts_and_hops() {
+        let hops = vec![hop("clusterer", 5, 0), hop("extractor", 0, 3)];
+        let gaps = vec![
+            gap("clusterer", "dropped", 3, 4, 3),
+            gap("clusterer", "dropped", 4, 4, 2),
+            gap("extractor", "lost", 4, 5, 3),
+        ];
+        let expected = [("clusterer dropped".to_owned(), 2), ("extractor lost".to_owned(), 1)];
+        assert_eq!(missing(hops, gaps, 4), expected);
+    }
+
+    #[test]
+    fn whole_sweeps_are_as_many_as_parts() {
+        // Sweep 5 was dropped before; the extractor lost 4 and 6.
+        let hops = vec![hop("clusterer", 1, 0), hop("extractor", 0, 2)];
+        let gaps = vec![gap("clusterer", "dropped", 5, 5, 1), gap("extractor", "lost", 4, 6, 2)];
+        let expected = [("clusterer dropped".to_owned(), 1), ("extractor lost".to_owned(), 2)];
+        assert_eq!(missing(hops, gaps, 1), expected);
+    }
+
+    #[test]
+    fn gaps_that_are_not_named_any_more_count_by_their_parts() {
+        assert_eq!(missing(vec![hop("clusterer", 9, 0)], vec![], 1), [("clusterer dropped".to_owned(), 9)]);
+        let named = vec![gap("clusterer", "dropped", 7, 7, 4)];
+        assert_eq!(missing(vec![hop("clusterer", 9, 0)], named, 4), [("clusterer dropped".to_owned(), 3)]);
+    }
 }

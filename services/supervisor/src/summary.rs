@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
-use recorder::Percentiles;
+use messages::Step;
+use recorder::{Percentiles, WorstHop, WorstSweep};
 
 use crate::Report;
+use crate::report::{LEAST_MARGIN_PCT, TraceReport};
 
 /// The summary of a run, a page of text.
 pub fn summary(report: &Report) -> String {
@@ -90,6 +92,9 @@ fn write_latency(text: &mut String, report: &Report) -> std::fmt::Result {
         )
     };
     row("end to end", &report.latency_ms.end_to_end)?;
+    if report.latency_ms.end_to_end_corrected.count > report.latency_ms.end_to_end.count {
+        row("  corrected", &report.latency_ms.end_to_end_corrected)?;
+    }
     row("obstacle", &report.obstacle_latency_ms)?;
     row("  on the seam", &report.seam_latency_ms)?;
     for hop in &report.ledger.hops {
@@ -99,11 +104,54 @@ fn write_latency(text: &mut String, report: &Report) -> std::fmt::Result {
             row(&format!("{} busy", hop.stage), &stage.busy)?;
         }
     }
+    write_deadline(text, report)?;
+    write_worst(text, report)
+}
+
+fn write_deadline(text: &mut String, report: &Report) -> std::fmt::Result {
     let deadline = &report.deadline;
-    let margin = deadline.margin_p999_pct.map_or(String::new(), |pct| format!(", margin at p99.9 {pct:.0} %"));
-    writeln!(text, "deadline {} ms: {} misses{margin}", deadline.deadline_ms, deadline.misses)?;
+    write!(text, "deadline {} ms: {} misses", deadline.deadline_ms, deadline.misses)?;
+    if let Some(margin) = deadline.margin_p999_pct {
+        let judged = if deadline.margin_ok == Some(true) { "flight practice: at least" } else { "SHORT of" };
+        write!(text, ", margin at p99.9 {margin:.0} % ({judged} {LEAST_MARGIN_PCT} %)")?;
+    }
+    writeln!(text)?;
     for (cause, misses) in &deadline.causes {
         writeln!(text, "  {misses} by {cause}")?;
+    }
+    if report.steps.keys().any(|step| step != Step::Nominal.name()) {
+        let steps: Vec<_> = Step::ALL
+            .iter()
+            .filter_map(|step| Some(format!("{} {}", step.name(), report.steps.get(step.name())?)))
+            .collect();
+        writeln!(text, "sweeps by step: {}", steps.join(", "))?;
+    }
+    if let Some(TraceReport { events, lost, missing, .. }) = report.trace {
+        writeln!(text, "trace: {events} events; {lost} parts lost, {missing} never came")?;
+    }
+    Ok(())
+}
+
+/// Sweeps shown as they came through the chain.
+const WORST_SHOWN: usize = 3;
+
+fn write_worst(text: &mut String, report: &Report) -> std::fmt::Result {
+    if report.worst_sweeps.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nslowest sweeps [ms]: queued + wake-up + cpu taken + busy, by stage")?;
+    for WorstSweep { sweep, end_to_end_ms, cause, step, hops } in report.worst_sweeps.iter().take(WORST_SHOWN) {
+        let step = if step == Step::Nominal.name() { String::new() } else { format!(" at {step}") };
+        writeln!(text, "  {sweep}: {end_to_end_ms:.1} by {cause}{step}")?;
+        let hop = |(place, hop): (usize, &WorstHop)| {
+            let WorstHop { stage, queued_ms, wake_ms, taken_ms, busy_ms, finished_after_due_ms, .. } = hop;
+            match place {
+                0 => format!("{stage} late {:.1}", finished_after_due_ms.max(0.0)),
+                _ => format!("{stage} {queued_ms:.1} + {wake_ms:.1} + {taken_ms:.1} + {busy_ms:.1}"),
+            }
+        };
+        let hops: Vec<_> = hops.iter().enumerate().map(hop).collect();
+        writeln!(text, "    {}", hops.join(" | "))?;
     }
     Ok(())
 }

@@ -70,6 +70,8 @@ pub struct Outputs {
     pub detections: Option<PathBuf>,
     /// Labels, one CSV row a return.
     pub labels: Option<PathBuf>,
+    /// The way of every part in the Trace Event Format.
+    pub trace: Option<PathBuf>,
 }
 
 impl Plan {
