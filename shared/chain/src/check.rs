@@ -1,8 +1,7 @@
 use messages::MAX_HOPS;
 use serde::{Deserialize, Serialize};
 
-use crate::overload::Overload;
-use crate::{ChainFile, SourceFile};
+use crate::{ChainFile, Realtime, SourceFile};
 
 /// What the source writes.
 const SWEEP: &str = "Sweep";
@@ -34,6 +33,8 @@ pub struct Chain {
     pub default_sweeps: u64,
     /// The stages in flow order; the last is the sink. The source is not among them.
     pub stages: Vec<Wired>,
+    /// What is asked of the kernel.
+    pub realtime: Realtime,
 }
 
 /// A stage in its place.
@@ -77,33 +78,18 @@ pub enum ChainError {
         /// What it must be.
         expected: &'static str,
     },
-    /// Budgets that leave no time for the way between the stages.
-    #[error("the budgets add up to {sum_ms} ms, must be at most deadline_ms = {deadline_ms}")]
-    Budgets {
-        /// Their sum [ms].
-        sum_ms: f64,
-        /// The deadline [ms].
-        deadline_ms: f64,
+    /// A real-time setting outside its bounds.
+    #[error("{process}: realtime.{key} is {value}, must be {expected}")]
+    Realtime {
+        /// The process.
+        process: String,
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: u32,
+        /// What it must be.
+        expected: &'static str,
     },
-    /// An answer in time that nobody may act on.
-    #[error("deadline_ms is {deadline_ms}, must be at most allowed_age_ms = {allowed_age_ms}")]
-    Age {
-        /// The deadline [ms].
-        deadline_ms: f64,
-        /// The allowed age [ms].
-        allowed_age_ms: f64,
-    },
-    /// A stage that is waited for and may take for ever.
-    #[error("stage {0:?} has no budget_ms, must have one: only the last stage has none")]
-    NoBudget(String),
-    /// A step of overload that there is none of.
-    #[error(
-        "overload.steps names {0:?}, must name \"fewer-starts\", \"paper-features\", \"clusters-only\" or \"every-second-sweep\""
-    )]
-    Step(String),
-    /// Steps of overload out of order.
-    #[error("overload.steps has {0:?} after a later step, must go from the gentlest to the last, each once")]
-    StepOrder(String),
     /// Too few or too many stages for a chain.
     #[error("[[stage]] stands {0} times, must stand 1 to {max} times", max = MAX_HOPS - 1)]
     Length(usize),
@@ -171,7 +157,8 @@ impl ChainFile {
         number("restart_window_s", window, "within (0, 86400]", window > 0.0 && window <= 86_400.0)?;
         number("source.sweeps", self.source.sweeps as f64, "1 or more", self.source.sweeps >= 1)?;
         self.check_wires()?;
-        let SourceFile { from: default_source, sweeps: default_sweeps } = self.source;
+        let realtime = Realtime::checked(&self)?;
+        let SourceFile { from: default_source, sweeps: default_sweeps, .. } = self.source;
         Ok(Chain {
             sectors: self.sectors,
             queue_sweeps: self.queue_sweeps,
@@ -192,6 +179,7 @@ impl ChainFile {
                     budget_ms: stage.budget_ms,
                 })
                 .collect(),
+            realtime,
         })
     }
 

@@ -85,6 +85,8 @@ impl Shell {
     }
 
     pub(crate) fn running(&self) {
+        // Everything is mapped by now, and the recorder's writer has been started as an ordinary thread.
+        crate::realtime::take_seat_of_stage(&self.instance, &self.plan.chain, &self.name);
         self.page.set_state(State::Running);
         self.page.beat(clock::now_ns());
         tracing::debug!(stage = self.name, incarnation = self.incarnation, "running");

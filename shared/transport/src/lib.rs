@@ -7,6 +7,7 @@
 //!
 //! Overflow drops the oldest message in silence; a reader knows from [`Hop::sequence`](messages::Hop::sequence).
 
+mod bill;
 mod error;
 mod inlet;
 mod instance;
@@ -14,6 +15,7 @@ mod node;
 mod outlet;
 mod wire;
 
+pub use bill::Segment;
 pub use error::TransportError;
 pub use inlet::{Inlet, Taken};
 pub use instance::{Instance, InstanceError, MAX_NAME_LEN};

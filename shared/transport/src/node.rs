@@ -13,7 +13,9 @@ pub(crate) type Topic<T> = publish_subscribe::PortFactory<Ipc, Wire<T>, WireTrac
 pub(crate) type Wakeups = event::PortFactory<Ipc>;
 
 /// Readers of a topic: the next stage and two taps. Each adds its buffer to the shared memory bill.
-const MAX_SUBSCRIBERS: usize = 3;
+pub(crate) const MAX_SUBSCRIBERS: usize = 3;
+/// Messages that a reader may hold at once.
+pub(crate) const MAX_BORROWED: usize = 2;
 /// Processes that may have a topic open at once.
 const MAX_NODES: usize = 16;
 
@@ -68,7 +70,7 @@ impl Node {
             .max_subscribers(MAX_SUBSCRIBERS)
             .max_nodes(MAX_NODES)
             .subscriber_max_buffer_size(self.queue_parts)
-            .subscriber_max_borrowed_samples(2)
+            .subscriber_max_borrowed_samples(MAX_BORROWED)
             .history_size(0)
             .enable_safe_overflow(true)
             .create()
