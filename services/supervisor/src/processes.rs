@@ -6,6 +6,7 @@ use rustix::param::{clock_ticks_per_second, page_size};
 use serde::{Deserialize, Serialize};
 
 use crate::child::Watched;
+use crate::scheduling::Scheduling;
 
 /// Resident memory counts as the first after this time and so many sweeps, whichever is later.
 pub(crate) const SETTLE_NS: u64 = 5_000_000_000;
@@ -17,6 +18,7 @@ pub(crate) struct Sample {
     cpu_s: f64,
     rss_kib: u64,
     rss_peak_kib: u64,
+    scheduling: Scheduling,
 }
 
 impl Sample {
@@ -29,6 +31,7 @@ impl Sample {
             cpu_s: cpu_ticks as f64 / clock_ticks_per_second() as f64,
             rss_kib: rss_pages * page_size() as u64 / 1024,
             rss_peak_kib: parse_peak_kib(&status).unwrap_or(0),
+            scheduling: Scheduling::of(pid),
         })
     }
 }
@@ -50,6 +53,7 @@ fn parse_peak_kib(status: &str) -> Option<u64> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Usage {
     cpu_of_earlier_lives_s: f64,
+    scheduling_of_earlier_lives: Scheduling,
     life: Option<u32>,
     last: Sample,
     rss_peak_kib: u64,
@@ -62,6 +66,7 @@ impl Usage {
         let Some(sample) = Sample::of(pid) else { return };
         if self.life.is_some_and(|life| life != pid) {
             self.cpu_of_earlier_lives_s += self.last.cpu_s;
+            self.scheduling_of_earlier_lives = self.scheduling();
         }
         self.life = Some(pid);
         self.last = sample;
@@ -71,8 +76,13 @@ impl Usage {
         }
     }
 
-    fn cpu_s(&self) -> f64 {
+    /// CPU time of all lives [s].
+    pub(crate) fn cpu_s(&self) -> f64 {
         self.cpu_of_earlier_lives_s + self.last.cpu_s
+    }
+
+    fn scheduling(&self) -> Scheduling {
+        self.scheduling_of_earlier_lives.plus(self.last.scheduling)
     }
 }
 
@@ -95,6 +105,13 @@ pub struct ProcessReport {
     pub rss_first_kib: u64,
     /// Memory resident at the last look.
     pub rss_last_kib: u64,
+    /// Time that its threads were ready to run and another had the core [ms], the sum over threads that live at the last
+    /// look of each life; null where the kernel does not count it. Steal time is not in it.
+    pub run_delay_ms: Option<f64>,
+    /// Times that its threads gave up the core to wait.
+    pub voluntary_switches: u64,
+    /// Times that its threads were made to give up the core.
+    pub involuntary_switches: u64,
     /// Heap allocations inside `process`, after warm-up; null where none was counted.
     pub heap_allocations_per_sweep: Option<f64>,
     /// Heap allocations of the shell round it.
@@ -122,6 +139,7 @@ impl ProcessReport {
     }
 
     fn of_usage(stage: &str, usage: &Usage, run_s: f64) -> Self {
+        let scheduling = usage.scheduling();
         Self {
             stage: stage.to_owned(),
             pid: 0,
@@ -131,6 +149,9 @@ impl ProcessReport {
             rss_peak_kib: usage.rss_peak_kib,
             rss_first_kib: usage.rss_first_kib.unwrap_or(usage.last.rss_kib),
             rss_last_kib: usage.last.rss_kib,
+            run_delay_ms: scheduling.run_delay_ns.map(|ns| (ns as f64 / 1e3).round() / 1e3),
+            voluntary_switches: scheduling.voluntary,
+            involuntary_switches: scheduling.involuntary,
             heap_allocations_per_sweep: None,
             shell_heap_allocations_per_sweep: None,
         }

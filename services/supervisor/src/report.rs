@@ -6,7 +6,7 @@ use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::ledger::LedgerReport;
-use crate::overload::OverloadReport;
+use crate::machine::MachineLoad;
 use crate::processes::ProcessReport;
 
 /// Everything that is known of a run, as `--report` writes it.
@@ -46,6 +46,12 @@ pub struct Report {
     pub steps: BTreeMap<String, u64>,
     /// The processes, the source first, the supervisor last.
     pub processes: Vec<ProcessReport>,
+    /// Who had the cores.
+    pub machine_load: MachineLoad,
+    /// How late a thread that waits for the time is woken.
+    pub noise_ms: Percentiles,
+    /// Real-time settings that the kernel refused, one line each.
+    pub realtime_refused: Vec<String>,
     /// Detections by class.
     pub detections: BTreeMap<ObstacleClass, u64>,
     /// Accepted returns of all sweeps.
@@ -126,13 +132,15 @@ pub(crate) struct Facts<'a> {
     pub(crate) published: u64,
     pub(crate) duration_s: f64,
     pub(crate) processes: Vec<ProcessReport>,
-    pub(crate) overload: OverloadReport,
+    pub(crate) machine_load: MachineLoad,
+    pub(crate) noise_ms: Percentiles,
+    pub(crate) realtime_refused: Vec<String>,
     pub(crate) stopped: Option<String>,
 }
 
 impl Report {
     pub(crate) fn of(facts: Facts<'_>) -> Self {
-        let Facts { plan, snapshot, ledger, published, duration_s, processes, overload, stopped } = facts;
+        let Facts { plan, snapshot, ledger, published, duration_s, processes, stopped, .. } = facts;
         let stages = snapshot.stages.iter().map(|stage| {
             let latency = StageLatency {
                 transport: stage.transport.percentiles(),
@@ -164,6 +172,9 @@ impl Report {
             worst_sweeps: snapshot.worst,
             steps: snapshot.steps,
             processes,
+            machine_load: facts.machine_load,
+            noise_ms: facts.noise_ms,
+            realtime_refused: facts.realtime_refused,
             detections: ObstacleClass::ALL
                 .into_iter()
                 .map(|class| (class, snapshot.detections.get(&class).copied().unwrap_or(0)))

@@ -36,6 +36,7 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
     write_latency(text, report)?;
     write_overload(text, report)?;
     write_processes(text, report)?;
+    write_machine(text, report)?;
     let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
     writeln!(text, "\ndetections  {}", classes.join("  "))?;
     if let Some(reason) = &report.stopped {
@@ -181,6 +182,26 @@ fn write_processes(text: &mut String, report: &Report) -> std::fmt::Result {
             process.cpu_pct,
             process.rss_peak_kib as f64 / 1024.0
         )?;
+    }
+    Ok(())
+}
+
+/// What the machine did to the chain: one line, and one for each setting that was refused.
+fn write_machine(text: &mut String, report: &Report) -> std::fmt::Result {
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
+    let (load, noise) = (&report.machine_load, &report.noise_ms);
+    writeln!(
+        text,
+        "\nmachine     own {} %, other programs {} %, stolen {} % of a core; wakes late p50 {} p99.9 {} max {} ms",
+        number(load.own_cpu_pct),
+        number(load.foreign_cpu_pct),
+        number(load.steal_pct),
+        number(noise.p50),
+        number(noise.p999),
+        number(noise.max)
+    )?;
+    for line in &report.realtime_refused {
+        writeln!(text, "  {line}")?;
     }
     Ok(())
 }

@@ -1,8 +1,10 @@
 use std::time::Duration;
 
+use chain::SUPERVISOR;
 use crossbeam_channel::{Receiver, bounded, select, tick};
 use recorder::Snapshot;
 use runtime::page::{Page, State};
+use runtime::realtime::{self, AsBefore};
 use runtime::{Pace, Plan, clock};
 use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -10,7 +12,8 @@ use transport::{Instance, Node};
 
 use crate::child::{Ended, Watched};
 use crate::house::House;
-use crate::overload::{Ladder, OverloadReport, Trouble};
+use crate::machine::Machine;
+use crate::noise::Noise;
 use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS, Usage};
 use crate::progress::Progress;
 use crate::report::{Facts, Report};
@@ -85,6 +88,11 @@ pub(crate) struct Watch<'a> {
     started_ns: u64,
     next_sample_ns: u64,
     usage: Usage,
+    machine: Machine,
+    noise: Noise,
+    /// What the kernel refused, and the seat before it was asked.
+    refused: Vec<String>,
+    as_before: Option<AsBefore>,
     progress: Progress,
     ladder: Ladder,
     overload: OverloadReport,
@@ -120,15 +128,18 @@ impl<'a> Watch<'a> {
             started_ns: now_ns,
             next_sample_ns: now_ns + SAMPLE_NS,
             usage: Usage::default(),
-            progress: Progress::new(now_ns, plan),
-            ladder: Ladder::new(plan.chain.overload.clone()),
-            overload: OverloadReport::default(),
+            machine: Machine::default(),
+            noise: Noise::start(plan.chain.realtime.seat(SUPERVISOR).priority),
+            refused: Vec::new(),
+            as_before: None,
+            progress: Progress::new(now_ns, plan.sweeps),
             begun: false,
             stop_asked: false,
             failed: None,
             moved: 0,
             moved_ns: now_ns,
         };
+        watch.machine.look(now_ns, 0.0);
         let started = watch.start_all();
         if started.is_err() {
             watch.kill_all();
@@ -147,7 +158,21 @@ impl<'a> Watch<'a> {
             self.await_up(0)?;
         }
         self.begun = true;
+        self.take_seat();
         Ok(())
+    }
+
+    /// Asks the kernel for what the chain wants for this process, and warns once of what it refused to any.
+    fn take_seat(&mut self) {
+        let mut refused = realtime::refused_to_stages(self.instance, &self.plan.chain);
+        if self.plan.chain.realtime.asks() {
+            self.as_before = Some(AsBefore::remember());
+            refused.extend(realtime::take_seat(&self.plan.chain, SUPERVISOR));
+        }
+        self.refused = realtime::in_words(&refused);
+        for line in &self.refused {
+            tracing::warn!("{line}");
+        }
     }
 
     /// Waits until the stages from `first` on are connected, restarting those that die on the way.
@@ -270,6 +295,8 @@ impl<'a> Watch<'a> {
             return Ok(());
         }
         stage.recovering = true;
+        // A child inherits the seat of the one who starts it.
+        let _for_the_child = self.as_before.as_ref().map(AsBefore::for_a_moment);
         stage.start()
     }
 
@@ -310,6 +337,8 @@ impl<'a> Watch<'a> {
             }
         }
         self.usage.update(std::process::id(), settled);
+        let own_cpu_s = self.stages.iter().map(|stage| stage.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
+        self.machine.look(clock::now_ns(), own_cpu_s);
     }
 
     fn overload_report(&mut self) -> OverloadReport {
@@ -336,7 +365,9 @@ impl<'a> Watch<'a> {
             published: self.stages[0].page.published.get(),
             duration_s,
             processes,
-            overload,
+            machine_load: self.machine.load(),
+            noise_ms: self.noise.finish(),
+            realtime_refused: std::mem::take(&mut self.refused),
             stopped: self.failed.clone(),
         })
     }

@@ -16,8 +16,8 @@ pub(super) fn may(capability: CapabilitySet) -> bool {
     capabilities(None).is_ok_and(|sets| sets.effective.contains(capability))
 }
 
-/// Puts the calling thread under SCHED_FIFO.
-pub(super) fn raise(priority: u32) -> Result<(), Refusal> {
+/// Puts the calling thread under SCHED_FIFO, or says why the kernel does not.
+pub fn raise(priority: u32) -> Result<(), Refusal> {
     let params = SchedulerParams { priority: priority as i32 };
     set_scheduler(THIS, Scheduler::SCHED_FIFO, params).map_err(|cause| {
         let limit = getrlimit(Resource::Rtprio).current;
