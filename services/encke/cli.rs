@@ -48,6 +48,9 @@ pub(crate) enum Command {
     /// Look at a running chain, or stop it.
     #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
     Ctl(CtlArgs),
+    /// Say what this machine allows the chain, and what to do about the rest.
+    #[command(after_help = DOCTOR_NOTES)]
+    Doctor(DoctorArgs),
 }
 
 const RUN_EXAMPLES: &str = "Examples:
@@ -93,6 +96,15 @@ JSON lines of `fit` also say how many clusters had a fit, and the mean of residu
 Examples:
   encke bench --from config/scenes/default.toml
   encke bench --from sweeps/s4k.csv sweeps/s70k.csv --runs 50 --range 0.5 --json";
+
+const DOCTOR_NOTES: &str = "\
+ok: as it should be. warn: the chain runs, and would run better with the remedy. fail: it cannot run.
+Nothing is changed: what is tried is undone at once.
+Exit codes: 0 the chain can run, 1 it cannot, 2 its configuration cannot be read.
+
+Examples:
+  encke doctor
+  encke doctor --chain config/chain.toml --json    also what chain.toml asks for and would be refused";
 
 const INJECT_EXAMPLES: &str = "Faults:
   kill     SIGKILL to the stage's process
@@ -360,6 +372,17 @@ pub(crate) struct CtlArgs {
     /// The chain. [default: the only one that runs]
     #[arg(long, value_name = "NAME")]
     pub(crate) instance: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Options of `encke doctor`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DoctorArgs {
+    /// Topology and parameters: [default: ./config/chain.toml, else the one built in]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) chain: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -8,6 +8,7 @@ mod bench;
 mod cli;
 mod ctl;
 mod dispatch;
+mod doctor;
 mod evaluate;
 mod inject;
 mod instances;
@@ -75,6 +76,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
+        Command::Doctor(args) => doctor::doctor(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

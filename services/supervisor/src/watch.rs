@@ -169,7 +169,7 @@ impl<'a> Watch<'a> {
             self.as_before = Some(AsBefore::remember());
             refused.extend(realtime::take_seat(&self.plan.chain, SUPERVISOR));
         }
-        self.refused = realtime::in_words(&refused);
+        self.refused = realtime::in_words(&refused).iter().map(ToString::to_string).collect();
         for line in &self.refused {
             tracing::warn!("{line}");
         }

@@ -15,7 +15,7 @@ use chain::Chain;
 use transport::Instance;
 
 pub use memory::{LockPlan, segment_of, try_lock};
-pub use refusal::{Refusal, Setting, in_words};
+pub use refusal::{Refusal, Refused, Setting, in_words};
 pub use scheduling::{AsBefore, allowed_cores, raise, try_core, try_priority};
 
 /// Gives the calling thread the seat of `process`, and the process the memory that the chain asks for.

@@ -33,8 +33,18 @@ impl Refusal {
     }
 }
 
-/// One line for each setting that was refused, whatever the number of processes.
-pub fn in_words(refusals: &[Refusal]) -> Vec<String> {
+/// What was refused of one setting, whatever the number of processes.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{found}; {remedy}")]
+pub struct Refused {
+    /// What, to whom, and why.
+    pub found: String,
+    /// What would help all of them.
+    pub remedy: String,
+}
+
+/// One line for each setting that was refused.
+pub fn in_words(refusals: &[Refusal]) -> Vec<Refused> {
     let line = |setting| {
         let of: Vec<&Refusal> = refusals.iter().filter(|refusal| refusal.setting == setting).collect();
         let worst = of.iter().max_by_key(|refusal| refusal.value)?;
@@ -44,13 +54,9 @@ pub fn in_words(refusals: &[Refusal]) -> Vec<String> {
             Setting::LockMemory => "lock_memory".to_owned(),
         };
         let processes: Vec<&str> = of.iter().map(|refusal| refusal.process.as_str()).collect();
-        Some(format!(
-            "{what} refused for {} ({}), which go on without: {}; {}",
-            count(processes.len()),
-            processes.join(", "),
-            worst.reason,
-            worst.remedy
-        ))
+        let (count, names) = (count(processes.len()), processes.join(", "));
+        let found = format!("{what} refused for {count} ({names}), which go on without: {}", worst.reason);
+        Some(Refused { found, remedy: worst.remedy.clone() })
     };
     [Setting::Priority, Setting::Core, Setting::LockMemory].into_iter().filter_map(line).collect()
 }
@@ -84,7 +90,7 @@ mod tests {
             refusal("clusterer", Setting::Priority, 40),
             refusal("clusterer", Setting::Core, 7),
         ];
-        let lines = in_words(&refusals);
+        let lines: Vec<_> = in_words(&refusals).iter().map(ToString::to_string).collect();
         assert_eq!(lines.len(), 2);
         assert!(lines[0].starts_with("real-time priority 20 to 40 refused for 2 processes (source, clusterer)"));
         assert!(lines[0].ends_with("no 40; allow 40"));
