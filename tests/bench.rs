@@ -6,6 +6,7 @@ mod support;
 
 use std::fs;
 use std::path::Path;
+use std::process::Stdio;
 
 use serde_json::Value;
 use support::{encke, text};
@@ -194,4 +195,27 @@ fn what_cannot_be_timed_is_refused_in_one_line_before_anything_is() {
     refused(&["config/scenes/default.toml", "--sensor", "vlp-16"], &["--sensor", "scene"]);
     assert_eq!(encke().args(["bench"]).output().unwrap().status.code(), Some(2), "--from must be given");
     assert_eq!(encke().args(["bench", "--from", &walls, "--runs", "0"]).output().unwrap().status.code(), Some(2));
+}
+
+#[test]
+fn a_hop_through_shared_memory_beats_a_socket_and_leaves_nothing_behind() {
+    let mut command = encke();
+    command.args(["bench", "--hop", "--runs", "60", "--json"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let name = format!("hop-{}", child.id());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let hops: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&hops["returns"], &hops["bytes"], &hops["runs"]), (&69_440.into(), &1_111_040.into(), &60.into()));
+    for way in ["shared_memory", "socket"] {
+        let [p50, p99, max] = ["p50_us", "p99_us", "max_us"].map(|key| hops[way][key].as_f64().unwrap());
+        assert!(0.0 < p50 && p50 <= p99 && p99 <= max, "{hops}");
+    }
+    let ratio = hops["ratio_p50"].as_f64().unwrap();
+    assert!(ratio > 1.5, "{hops}");
+    let left = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let left: Vec<_> = left.filter(|file| file.starts_with(&format!("encke_{name}_"))).collect();
+    assert_eq!(left, Vec::<String>::new());
+    assert!(!transport::Instance::named(&name).unwrap().dir().exists());
+    assert_eq!(encke().args(["bench", "--hop", "--range", "1"]).output().unwrap().status.code(), Some(2));
 }

@@ -2,6 +2,7 @@
 
 mod clustering;
 mod extraction;
+pub(crate) mod hop;
 mod judge;
 mod measure;
 mod stages;
@@ -24,6 +25,9 @@ use stages::{STAGES, Workbench, zeroed};
 pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
     let assets = Assets::beside(args.chain.as_deref());
+    if args.hop {
+        return hop::hop(args, &assets);
+    }
     // All that may be refused is, before anything is timed.
     let mut sweeps = Vec::new();
     let mut built = None;

@@ -42,6 +42,9 @@ pub(crate) enum Command {
     /// Time each stage's work on one sweep, without processes, on one thread.
     #[command(after_help = BENCH_NOTES)]
     Bench(BenchArgs),
+    /// The reading end of `encke bench --hop`.
+    #[command(hide = true)]
+    BenchHopPeer(HopPeerArgs),
     /// Put one fault into a running chain, to see it accounted for.
     #[command(after_help = INJECT_EXAMPLES)]
     Inject(InjectArgs),
@@ -93,8 +96,12 @@ The sweep is a recording's first complete one (its first where none is), or a sc
 Reading it is not timed. All runs must give the same output to the byte, else the exit code is 1.
 JSON lines of `fit` also say how many clusters had a fit, and the mean of residuals evaluated for one.
 
+--hop times something else: how long a sweep of 1.1 MB takes from one process to another that
+sleeps, through the chain's shared memory and through a Unix socket, by turns.
+
 Examples:
   encke bench --from config/scenes/default.toml
+  encke bench --hop --runs 2000
   encke bench --from sweeps/s4k.csv sweeps/s70k.csv --runs 50 --range 0.5 --json";
 
 const DOCTOR_NOTES: &str = "\
@@ -298,10 +305,14 @@ pub(crate) struct EvaluateArgs {
 #[derive(Args, Clone, Debug)]
 pub(crate) struct BenchArgs {
     /// Scenes (.toml) or recordings, as `encke run` takes them; one sweep of each.
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    #[arg(long, value_name = "FILE", required_unless_present = "hop", num_args = 1..)]
     pub(crate) from: Vec<PathBuf>,
+    /// Time the hop from process to process instead of the stages. [runs: 1000]
+    #[arg(long, conflicts_with_all = ["from", "range", "min_points", "model", "format", "sensor"])]
+    pub(crate) hop: bool,
     /// How often each stage is timed, after a few runs that are not.
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(default_value_if("hop", "true", "1000"))]
     pub(crate) runs: u32,
     /// The clusterer's range d [m]. [default: its file's range_d_m]
     #[arg(long, value_name = "D", allow_negative_numbers = true)]
@@ -324,6 +335,17 @@ pub(crate) struct BenchArgs {
     /// Print one JSON object for each stage and sweep.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What `encke bench --hop` tells the process that it starts.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct HopPeerArgs {
+    /// The instance to read from.
+    #[arg(long)]
+    pub(crate) instance: String,
+    /// Messages that come through shared memory; as many come through the socket.
+    #[arg(long)]
+    pub(crate) messages: u32,
 }
 
 /// A fault that can be put into a running chain.

@@ -74,6 +74,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::train(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),
         Command::Bench(args) => bench::bench(&args),
+        Command::BenchHopPeer(args) => bench::hop::peer(&args),
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
