@@ -24,10 +24,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod blocks;
 mod darboux;
 mod features;
 pub mod fit;
 mod histogram;
+mod kd_tree;
 mod neighbours;
 mod normals;
 mod params;

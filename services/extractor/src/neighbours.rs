@@ -1,206 +1,108 @@
+use pulp::Arch;
+
+use crate::blocks::Blocks;
+use crate::kd_tree::KdTree;
+
 /// Most neighbours of a point, itself not counted: what [`messages::MAX_BINS`] leaves room for.
 pub const MAX_OTHERS: usize = 5;
 
-/// Points of a leaf: below this a scan is faster than a descent.
-const LEAF: usize = 8;
+/// Up to this many points no order is asked for: all blocks of them are looked at.
+const FEW: usize = 128;
 
-/// The nearest neighbours of every point of a cluster: exact, in a k-d tree rebuilt in place for each cluster.
+/// The nearest neighbours of every point of a cluster, exact.
 ///
 /// Neighbours are ordered by squared distance as `f32` computes it, `(dx² + dy²) + dz²`, then by index; so the result
-/// depends on the points alone and equals a brute-force search to the bit. The tree needs neither rings nor columns:
-/// unorganised clouds are served alike. O(n log n); memory is taken once, in [`Neighbours::new`].
+/// depends on the points alone and equals a brute-force search to the bit, by whichever way it is found: small clusters and
+/// those with rings by blocks of points side by side, large ones without rings in a k-d tree. Memory is taken once, in
+/// [`Neighbours::new`].
 #[derive(Debug)]
 pub struct Neighbours {
+    arch: Arch,
+    capacity: usize,
     wanted: usize,
-    /// Neighbours that each point of the present cluster has.
-    found: usize,
-    /// Index of the point at each place of the tree.
-    index_at: Vec<u32>,
-    /// The points by place, so that a leaf is read in one go.
-    point_at: Vec<[f32; 3]>,
-    /// Split of the node whose middle place this is.
-    split_at: Vec<Split>,
-    near: Vec<u32>,
-    distance_m: Vec<f32>,
+    blocks: Blocks,
+    tree: KdTree,
+    found: Found,
+}
+
+/// Neighbours of each point, as many as `each`, nearest first.
+#[derive(Debug)]
+pub(crate) struct Found {
+    pub(crate) each: usize,
+    pub(crate) near: Vec<u32>,
+    pub(crate) distance_m: Vec<f32>,
 }
 
 impl Neighbours {
     /// Room for clusters of up to `capacity` points, each with `others` neighbours (1 to [`MAX_OTHERS`]; more are cut).
     pub fn new(capacity: usize, others: usize) -> Self {
         let wanted = others.clamp(1, MAX_OTHERS);
+        let found = Found { each: 0, near: vec![0; capacity * wanted], distance_m: vec![0.0; capacity * wanted] };
         Self {
+            arch: Arch::new(),
+            capacity,
             wanted,
-            found: 0,
-            index_at: vec![0; capacity],
-            point_at: vec![[0.0; 3]; capacity],
-            split_at: vec![Split::default(); capacity],
-            near: vec![0; capacity * wanted],
-            distance_m: vec![0.0; capacity * wanted],
+            blocks: Blocks::new(capacity),
+            tree: KdTree::new(capacity),
+            found,
         }
     }
 
-    /// Finds the neighbours of every point [m]; each has as many as were asked for, or all others where there are fewer.
+    /// Finds the neighbours of every point [m], in any order; each has as many as were asked for, or all others where there
+    /// are fewer.
     ///
     /// Points must be finite, and no more than the capacity: what is over is left out.
     pub fn find(&mut self, points: &[[f32; 3]]) {
-        let count = points.len().min(self.index_at.len());
-        self.found = self.wanted.min(count.saturating_sub(1));
-        if self.found == 0 {
+        let points = self.begin(points);
+        if points.len() <= FEW {
+            self.blocks.lay_out(points);
+            self.blocks.find(self.arch, &mut self.found);
             return;
         }
-        for (place, index) in self.index_at[..count].iter_mut().enumerate() {
-            *index = place as u32;
-        }
-        build(&mut self.index_at[..count], &mut self.split_at[..count], points);
-        for (at, &index) in self.point_at.iter_mut().zip(&self.index_at[..count]) {
-            *at = points[index as usize];
-        }
-        let tree = Tree {
-            index_at: &self.index_at[..count],
-            point_at: &self.point_at[..count],
-            split_at: &self.split_at[..count],
-        };
-        // In order of places: one search's leaves are warm for the next.
-        for place in 0..count {
-            let index = tree.index_at[place];
-            let mut best = Best::new(self.found);
-            tree.search(tree.point_at[place], index, 0..count, [0.0; 3], &mut best);
-            let from = index as usize * self.found;
-            for (rank, &(distance2, other)) in best.found().iter().enumerate() {
-                self.near[from + rank] = other;
-                self.distance_m[from + rank] = distance2.sqrt();
+        let found = &mut self.found;
+        self.tree.find(points, found.each, |index, best| {
+            let from = index * found.each;
+            for (rank, &(distance2, other)) in best.iter().enumerate() {
+                found.near[from + rank] = other;
+                found.distance_m[from + rank] = distance2.sqrt();
             }
+        });
+    }
+
+    /// Finds the same, faster, given each point's ring, points of a ring being in order of azimuth: whatever they are, the
+    /// neighbours are those of [`Neighbours::find`]. `rings` must be as many as the points, else they are not used.
+    pub fn find_in_rings(&mut self, points: &[[f32; 3]], rings: &[u8]) {
+        if points.len() <= FEW || points.len() != rings.len() {
+            return self.find(points);
         }
+        let points = self.begin(points);
+        self.blocks.lay_out_by_ring(points, &rings[..points.len()]);
+        self.blocks.find(self.arch, &mut self.found);
     }
 
     /// Neighbours of the point at `index`, nearest first: places in the slice given to [`Neighbours::find`].
     pub fn of(&self, index: usize) -> &[u32] {
-        &self.near[index * self.found..(index + 1) * self.found]
+        &self.found.near[index * self.found.each..(index + 1) * self.found.each]
     }
 
     /// Distances of [`Neighbours::of`] [m].
     pub fn distances_m(&self, index: usize) -> &[f32] {
-        &self.distance_m[index * self.found..(index + 1) * self.found]
-    }
-}
-
-/// Where a node parts its points: the lower half lies at or below the value, the upper half at or above it.
-#[derive(Clone, Copy, Debug, Default)]
-struct Split {
-    value: f32,
-    axis: u8,
-}
-
-/// Puts the lower half by the widest axis before the upper one, and so on down to the leaves.
-fn build(index_at: &mut [u32], split_at: &mut [Split], points: &[[f32; 3]]) {
-    let count = index_at.len();
-    if count <= LEAF {
-        return;
-    }
-    let axis = widest_axis(index_at, points);
-    let middle = count / 2;
-    let (_, &mut median, _) = index_at.select_nth_unstable_by(middle, |&a, &b| {
-        points[a as usize][axis].total_cmp(&points[b as usize][axis]).then(a.cmp(&b))
-    });
-    split_at[middle] = Split { value: points[median as usize][axis], axis: axis as u8 };
-    let (lower, upper) = index_at.split_at_mut(middle);
-    let (lower_splits, upper_splits) = split_at.split_at_mut(middle);
-    build(lower, lower_splits, points);
-    // Leaves this node's split in place: it is the upper half's first, and a node's own lies at its middle.
-    build(upper, upper_splits, points);
-}
-
-fn widest_axis(index_at: &[u32], points: &[[f32; 3]]) -> usize {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for &index in index_at {
-        let point = points[index as usize];
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point[axis]);
-            high[axis] = high[axis].max(point[axis]);
-        }
-    }
-    let mut widest = 0;
-    for axis in 1..3 {
-        if high[axis] - low[axis] > high[widest] - low[widest] {
-            widest = axis;
-        }
-    }
-    widest
-}
-
-struct Tree<'a> {
-    index_at: &'a [u32],
-    point_at: &'a [[f32; 3]],
-    split_at: &'a [Split],
-}
-
-impl Tree<'_> {
-    /// `gap_m` is the vector from the point to the node's box, 0 along the axes where it lies inside.
-    fn search(&self, point: [f32; 3], index: u32, places: std::ops::Range<usize>, gap_m: [f32; 3], best: &mut Best) {
-        if places.len() <= LEAF {
-            for place in places {
-                let other = self.index_at[place];
-                if other != index {
-                    best.offer(squared_distance(point, self.point_at[place]), other);
-                }
-            }
-            return;
-        }
-        let middle = places.start + places.len() / 2;
-        let split = self.split_at[middle];
-        let axis = usize::from(split.axis);
-        let to_split = split.value - point[axis];
-        let (lower, upper) = (places.start..middle, middle..places.end);
-        let (near, far) = if to_split > 0.0 { (lower, upper) } else { (upper, lower) };
-        self.search(point, index, near, gap_m, best);
-        let mut far_gap_m = gap_m;
-        far_gap_m[axis] = to_split;
-        // Rounding is monotone and both sums go in the same order, so no nearer point can hide behind this bound;
-        // equality must descend, for a smaller index may lie there.
-        if norm2(far_gap_m) <= best.worst_m2() {
-            self.search(point, index, far, far_gap_m, best);
-        }
-    }
-}
-
-fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    norm2([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
-}
-
-fn norm2(v: [f32; 3]) -> f32 {
-    (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]
-}
-
-/// The nearest candidates so far, nearest first.
-struct Best {
-    wanted: usize,
-    entries: [(f32, u32); MAX_OTHERS],
-}
-
-impl Best {
-    fn new(wanted: usize) -> Self {
-        Self { wanted, entries: [(f32::INFINITY, u32::MAX); MAX_OTHERS] }
+        &self.found.distance_m[index * self.found.each..(index + 1) * self.found.each]
     }
 
-    fn worst_m2(&self) -> f32 {
-        self.entries[self.wanted - 1].0
+    /// Neighbours that each point has.
+    pub(crate) fn each(&self) -> usize {
+        self.found.each
     }
 
-    fn offer(&mut self, distance2: f32, index: u32) {
-        let before = |entry: (f32, u32)| distance2 < entry.0 || (distance2 == entry.0 && index < entry.1);
-        let mut rank = self.wanted - 1;
-        if !before(self.entries[rank]) {
-            return;
-        }
-        while rank > 0 && before(self.entries[rank - 1]) {
-            self.entries[rank] = self.entries[rank - 1];
-            rank -= 1;
-        }
-        self.entries[rank] = (distance2, index);
+    /// How this machine computes.
+    pub(crate) fn arch(&self) -> Arch {
+        self.arch
     }
 
-    fn found(&self) -> &[(f32, u32)] {
-        &self.entries[..self.wanted]
+    fn begin<'a>(&mut self, points: &'a [[f32; 3]]) -> &'a [[f32; 3]] {
+        let points = &points[..points.len().min(self.capacity)];
+        self.found.each = self.wanted.min(points.len().saturating_sub(1));
+        points
     }
 }
