@@ -23,30 +23,44 @@ impl Darboux {
     /// length. None where the frame is undefined: equal points, or a neighbour straight along the normal.
     ///
     /// v is made a unit vector, which Eq. 1 leaves out: else α would be no angle but grow with the distance.
+    #[inline(always)]
     pub fn between(normal_i: [f32; 3], normal_j: [f32; 3], offset: [f32; 3], distance_m: f32) -> Option<Self> {
-        if distance_m <= 0.0 {
-            return None;
-        }
+        let (pair, defined) = Self::or_undefined(normal_i, normal_j, offset, distance_m);
+        defined.then_some(pair)
+    }
+
+    /// The same without a branch, so that pairs can be worked on side by side: the angles, and whether there are any.
+    #[inline(always)]
+    pub(crate) fn or_undefined(
+        normal_i: [f32; 3],
+        normal_j: [f32; 3],
+        offset: [f32; 3],
+        distance_m: f32,
+    ) -> (Self, bool) {
         let towards = offset.map(|c| c / distance_m);
         let u = normal_i; // Eq. (1)
         let across = cross(towards, u);
         let length = dot(across, across).sqrt();
-        if length < 1e-6 {
-            return None;
-        }
         let v = across.map(|c| c / length); // Eq. (1)
         let w = cross(u, v); // Eq. (1)
-        Some(Self {
+        let pair = Self {
             alpha: snapped(dot(v, normal_j)),     // Eq. (2)
             phi: snapped(dot(u, towards)),        // Eq. (2)
             theta_sin: snapped(dot(w, normal_j)), // Eq. (2)
             theta_cos: dot(u, normal_j),
-        })
+        };
+        (pair, (distance_m > 0.0) & (length >= 1e-6))
     }
 
     /// Place in the joint histogram: `(level(α)·12 + level(φ))·12 + level(θ)`, 0 to 1727.
     pub fn bin(self) -> usize {
-        joint_bin(sine_level(self.alpha), sine_level(self.phi), angle_level(self.theta_sin, self.theta_cos))
+        self.place() as usize
+    }
+
+    #[inline(always)]
+    pub(crate) fn place(self) -> u32 {
+        let theta = angle_level(self.theta_sin, self.theta_cos);
+        (sine_level(self.alpha) * LEVELS as u32 + sine_level(self.phi)) * LEVELS as u32 + theta
     }
 }
 
@@ -56,34 +70,43 @@ pub const fn joint_bin(alpha: usize, phi: usize, theta: usize) -> usize {
 }
 
 /// Level of a value in [−1, 1]: equal steps, a lower edge belongs to its level, 1 to the last.
-fn sine_level(value: f32) -> usize {
+#[inline(always)]
+fn sine_level(value: f32) -> u32 {
+    const LAST: f32 = LEVELS as f32 - 1.0;
     let steps = (value + 1.0) * (LEVELS as f32 / 2.0);
-    (steps.max(0.0) as usize).min(LEVELS - 1)
+    let steps = if steps > 0.0 { steps } else { 0.0 };
+    // As a signed number first: the only one that older machines make side by side.
+    (if steps < LAST { steps } else { LAST }) as i32 as u32
 }
 
 /// Level of θ = atan2(sin, cos) in [−π, π] in steps of 30°, found by signs: an edge belongs to the level farther from
 /// 0 on either side, but 0 itself to the level above and ±π to the last and first.
-fn angle_level(sin: f32, cos: f32) -> usize {
+#[inline(always)]
+fn angle_level(sin: f32, cos: f32) -> u32 {
+    const HALF: u32 = LEVELS as u32 / 2;
     const COS_30: f32 = 0.866_025_4;
     const SIN_30: f32 = 0.5;
     let height = sin.abs();
     let mut steps = 0;
     for (edge_sin, edge_cos) in [(SIN_30, COS_30), (COS_30, SIN_30), (1.0, 0.0), (COS_30, -SIN_30), (SIN_30, -COS_30)] {
         // The sine of θ less the edge.
-        steps += usize::from(height * edge_cos - cos * edge_sin >= 0.0);
+        steps += u32::from(height * edge_cos - cos * edge_sin >= 0.0);
     }
     // Between 0 and 180° the five edges are passed one after the other, each sine staying positive up to 180°.
-    if sin >= 0.0 { LEVELS / 2 + steps } else { LEVELS / 2 - 1 - steps }
+    if sin >= 0.0 { HALF + steps } else { HALF - 1 - steps }
 }
 
+#[inline(always)]
 fn snapped(sine: f32) -> f32 {
     if sine.abs() < FLAT { 0.0 } else { sine }
 }
 
+#[inline(always)]
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -125,7 +148,7 @@ mod tests {
         for step in 0..7_200 {
             // Half a step off the edges, whose owner the signs decide.
             let theta = (f64::from(step) + 0.5) / 7_200.0 * std::f64::consts::TAU - std::f64::consts::PI;
-            let expected = ((theta + std::f64::consts::PI) / std::f64::consts::TAU * 12.0).floor() as usize;
+            let expected = ((theta + std::f64::consts::PI) / std::f64::consts::TAU * 12.0).floor() as u32;
             assert_eq!(angle_level(theta.sin() as f32, theta.cos() as f32), expected, "{theta}");
         }
         assert_eq!(angle_level(0.0, 1.0), 6);

@@ -1,15 +1,14 @@
 use lidar::{MAX_RETURNS, Return};
 use messages::MIN_FEATURE_POINTS;
 
-use crate::stride::served_stride;
-use crate::{CheckedParams, Histogram, Neighbours, estimate_normals};
+use crate::{CheckedParams, Histogram, Neighbours, Phases, estimate_normals};
 
 /// The paper's feature extraction (Sec. III-B) on one cluster at a time, with the memory it needs.
 #[derive(Debug)]
 pub struct Features {
     neighbours: Neighbours,
     histogram: Histogram,
-    points: Vec<[f32; 3]>,
+    phases: Phases,
     normals: Vec<[f32; 3]>,
 }
 
@@ -19,7 +18,7 @@ impl Features {
         Self {
             neighbours: Neighbours::new(MAX_RETURNS, params.others),
             histogram: Histogram::new(MAX_RETURNS),
-            points: Vec::with_capacity(MAX_RETURNS),
+            phases: Phases::new(MAX_RETURNS),
             normals: vec![[0.0; 3]; MAX_RETURNS],
         }
     }
@@ -27,30 +26,19 @@ impl Features {
     /// Histogram of one cluster's returns (finite, no more than [`MAX_RETURNS`]), read in strides of `stride` columns;
     /// empty for fewer than [`MIN_FEATURE_POINTS`].
     ///
-    /// Returns whose columns are equal modulo the stride make one phase: a cluster as a sensor with `stride` times fewer
-    /// columns would see it. Each phase of enough points adds its histogram. Where none has enough, the stride is lessened
-    /// until one has.
+    /// Each phase of enough points adds its histogram: see [`Phases`].
     pub fn describe(&mut self, returns: &[Return], stride: usize) -> &Histogram {
         self.histogram.clear();
         if returns.len() < MIN_FEATURE_POINTS || returns.len() > MAX_RETURNS {
             return &self.histogram;
         }
-        let stride = served_stride(returns, stride);
-        for phase in 0..stride {
-            let on_phase = |r: &&Return| usize::from(r.column) % stride == phase;
-            self.points.clear();
-            self.points.extend(returns.iter().filter(on_phase).map(Return::position));
-            if self.points.len() >= MIN_FEATURE_POINTS {
-                self.add_points();
-            }
+        self.phases.part(returns, stride);
+        for (points, rings) in self.phases.usable() {
+            let normals = &mut self.normals[..points.len()];
+            self.neighbours.find_in_rings(points, rings);
+            estimate_normals(points, &self.neighbours, normals);
+            self.histogram.add(points, normals, &self.neighbours);
         }
         &self.histogram
-    }
-
-    fn add_points(&mut self) {
-        let normals = &mut self.normals[..self.points.len()];
-        self.neighbours.find(&self.points);
-        estimate_normals(&self.points, &self.neighbours, normals);
-        self.histogram.add(&self.points, normals, &self.neighbours);
     }
 }

@@ -45,4 +45,4 @@ pub use normals::estimate_normals;
 pub use params::{CheckedParams, OverloadParams, Params, ParamsError};
 pub use relief::Relief;
 pub use room::Extractor;
-pub use stride::column_stride;
+pub use stride::{Phases, column_stride};

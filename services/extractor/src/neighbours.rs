@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use pulp::Arch;
 
 use crate::blocks::Blocks;
@@ -88,6 +90,12 @@ impl Neighbours {
     /// Distances of [`Neighbours::of`] [m].
     pub fn distances_m(&self, index: usize) -> &[f32] {
         &self.found.distance_m[index * self.found.each..(index + 1) * self.found.each]
+    }
+
+    /// Neighbours and their distances [m] of several points, one after the other.
+    pub(crate) fn of_range(&self, points: Range<usize>) -> (&[u32], &[f32]) {
+        let places = points.start * self.found.each..points.end * self.found.each;
+        (&self.found.near[places.clone()], &self.found.distance_m[places])
     }
 
     /// Neighbours that each point has.

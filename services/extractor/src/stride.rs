@@ -16,14 +16,76 @@ pub fn column_stride(header: &SweepHeader, spacing_rad: f32) -> usize {
     ((spacing_rad / header.column_step_rad).round() as usize).clamp(1, MAX_STRIDE)
 }
 
-/// The largest stride up to `wanted` at which some phase of the cluster (its returns with equal column modulo stride)
-/// has enough points for features; 1 at the least.
-pub(crate) fn served_stride(returns: &[Return], wanted: usize) -> usize {
-    (2..=wanted).rev().find(|&stride| (0..stride).any(|phase| enough(returns, stride, phase))).unwrap_or(1)
+/// A cluster's returns parted by column modulo a stride: each phase is the cluster as a sensor with `stride` times fewer
+/// columns would see it. Memory is taken once, in [`Phases::new`].
+#[derive(Debug)]
+pub struct Phases {
+    phases: usize,
+    /// First place of each phase, and the end of the last.
+    first: [usize; MAX_STRIDE + 1],
+    points: Vec<[f32; 3]>,
+    rings: Vec<u8>,
 }
 
-fn enough(returns: &[Return], stride: usize, phase: usize) -> bool {
-    returns.iter().filter(|r| usize::from(r.column) % stride == phase).nth(MIN_FEATURE_POINTS - 1).is_some()
+impl Phases {
+    /// Room for clusters of up to `capacity` returns.
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            phases: 0,
+            first: [0; MAX_STRIDE + 1],
+            points: vec![[0.0; 3]; capacity],
+            rings: vec![0; capacity],
+        }
+    }
+
+    /// Parts a cluster's returns (no more than the capacity, else none are taken) in strides of `wanted` columns, 1 to 18
+    /// (more are cut). Where no phase has [`MIN_FEATURE_POINTS`], the stride is lessened until one has; 1 at the least.
+    pub fn part(&mut self, returns: &[Return], wanted: usize) {
+        self.phases = 0;
+        if returns.len() > self.points.len() {
+            return;
+        }
+        let mut stride = wanted.clamp(1, MAX_STRIDE);
+        let mut next = counts(returns, stride);
+        while stride > 1 && next.iter().all(|&count| count < MIN_FEATURE_POINTS) {
+            stride -= 1;
+            next = counts(returns, stride);
+        }
+        self.phases = stride;
+        let mut end = 0;
+        for (first, next) in self.first.iter_mut().zip(&mut next) {
+            *first = end;
+            end += std::mem::replace(next, end);
+        }
+        self.first[stride] = end;
+        for r in returns {
+            let place = &mut next[phase(r, stride)];
+            self.points[*place] = r.position();
+            self.rings[*place] = r.ring;
+            *place += 1;
+        }
+    }
+
+    /// Points [m] and rings of each phase that has at least [`MIN_FEATURE_POINTS`], in the order of the returns.
+    pub fn usable(&self) -> impl Iterator<Item = (&[[f32; 3]], &[u8])> {
+        let places = self.first.windows(2).take(self.phases).map(|ends| ends[0]..ends[1]);
+        let usable = places.filter(|places| places.len() >= MIN_FEATURE_POINTS);
+        usable.map(|places| (&self.points[places.clone()], &self.rings[places]))
+    }
+}
+
+/// Returns of each phase.
+fn counts(returns: &[Return], stride: usize) -> [usize; MAX_STRIDE] {
+    let mut counts = [0; MAX_STRIDE];
+    for r in returns {
+        counts[phase(r, stride)] += 1;
+    }
+    counts
+}
+
+fn phase(r: &Return, stride: usize) -> usize {
+    // Narrow numbers divide fastest.
+    usize::from(r.column % stride as u16)
 }
 
 #[cfg(test)]
@@ -55,6 +117,31 @@ mod tests {
             assert_eq!(column_stride(&header(1, step), 0.0126), 1);
         }
         assert_eq!(column_stride(&header(1, 1e-30), 0.0126), MAX_STRIDE);
+    }
+
+    fn served_stride(returns: &[Return], wanted: usize) -> usize {
+        let mut phases = Phases::new(returns.len());
+        phases.part(returns, wanted);
+        phases.phases
+    }
+
+    #[test]
+    fn phases_keep_the_order_of_the_returns_and_leave_out_those_of_too_few() {
+        let mut returns = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17]);
+        for (place, r) in returns.iter_mut().enumerate() {
+            (r.x, r.ring) = (place as f32, place as u8 / 2);
+        }
+        let mut phases = Phases::new(13);
+        phases.part(&returns, 2);
+        let found: Vec<(Vec<f32>, Vec<u8>)> =
+            phases.usable().map(|(points, rings)| (points.iter().map(|p| p[0]).collect(), rings.to_vec())).collect();
+        let even = (vec![0.0, 2.0, 4.0, 6.0, 8.0, 9.0, 10.0, 11.0], vec![0, 1, 2, 3, 4, 4, 5, 5]);
+        assert_eq!(found, [even, (vec![1.0, 3.0, 5.0, 7.0, 12.0], vec![0, 1, 2, 3, 6])]);
+        phases.part(&returns, 3);
+        // Of phases 0, 1 and 2 only the first two have five.
+        assert_eq!(phases.usable().map(|(points, _)| points.len()).collect::<Vec<_>>(), [4 + 1, 5]);
+        phases.part(&columns(&[0; 14]), 1);
+        assert_eq!(phases.usable().count(), 0, "more than there is room for");
     }
 
     #[test]
