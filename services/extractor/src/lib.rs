@@ -30,6 +30,7 @@ mod features;
 pub mod fit;
 mod histogram;
 mod kd_tree;
+mod lanes;
 mod neighbours;
 mod normals;
 mod params;
