@@ -10,11 +10,13 @@ pub(crate) fn exp_of_negative(x: f32) -> f32 {
     /// Added and taken away again, it leaves the nearest whole number: 1.5 · 2^23.
     const WHOLE: f32 = 12_582_912.0;
     let bounded = x.clamp(-87.0, 0.0);
-    let n = (bounded * std::f32::consts::LOG2_E + WHOLE) - WHOLE;
+    let shifted = bounded * std::f32::consts::LOG2_E + WHOLE;
+    let n = shifted - WHOLE;
     let r = (bounded - n * LN_2_HIGH) - n * LN_2_LOW;
     let series =
         1.0 + r * (1.0 + r * (1.0 / 2.0 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0))))));
-    let power = f32::from_bits(((n as i32 + 127) << 23) as u32);
+    // The last bits of `shifted` are those of n; the others are shifted out.
+    let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23));
     if x < -87.0 { 0.0 } else { series * power }
 }
 

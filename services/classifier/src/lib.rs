@@ -21,6 +21,7 @@ mod boosted_trees_file;
 mod card;
 mod coupling;
 mod exponential;
+mod kernel;
 mod model;
 mod naive_bayes;
 mod naive_bayes_file;

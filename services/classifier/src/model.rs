@@ -1,7 +1,6 @@
 use lidar::ObstacleClass;
-use messages::{Bin, Descriptors, MAX_CLUSTERS};
+use messages::{Bin, Descriptors};
 
-use crate::svm::Sums;
 use crate::{
     BoostedTrees, BoostedTreesFileError, Card, CardError, Decision, MAX_CLASSES, Method, ModelFiles, NaiveBayes,
     NaiveBayesFileError, Svm, SvmFile, SvmFileError, misfit, solid_feature_names, solid_features,
@@ -31,8 +30,6 @@ pub struct SolidSvm {
     svm: Svm,
     /// The solid's place of each label.
     solids: [usize; MAX_CLASSES],
-    /// Of each descriptor of a sweep.
-    sums: Vec<Sums>,
 }
 
 /// What a model says of one descriptor.
@@ -145,7 +142,7 @@ impl Model {
         if !svm.has_probabilities() {
             return Err(ModelError::NoProbabilities(file));
         }
-        Ok(Self::Svm(SolidSvm { svm, solids, sums: vec![Sums::default(); MAX_CLUSTERS] }))
+        Ok(Self::Svm(SolidSvm { svm, solids }))
     }
 
     /// Judges a histogram: at least one bin, indices under 1728 in rising order. Boosted trees say `Unclassified`: they
@@ -156,7 +153,7 @@ impl Model {
     pub fn judge(&self, bins: &[Bin]) -> Judgement {
         match self {
             Self::NaiveBayes(model) => from_naive_bayes(model, bins),
-            Self::Svm(model) => model.judgement(&model.svm.decide(bins)),
+            Self::Svm(model) => judgement(&model.svm, &model.solids, &model.svm.decide(bins)),
             Self::BoostedTrees(_) => Judgement::NONE,
         }
     }
@@ -186,15 +183,13 @@ impl Model {
                 }
             }
             Self::Svm(model) => {
-                model.sums[..input.descriptors.len()].fill(Sums::default());
-                for tile in 0..model.svm.tiles() {
-                    for (place, bins) in described() {
-                        model.svm.add_to(&mut model.sums[place], tile, bins);
+                let SolidSvm { svm, solids } = model;
+                let mut places = described().map(|(place, _)| place);
+                svm.decide_all(described().map(|(_, bins)| bins), |svm, _, decision| {
+                    if let Some(place) = places.next() {
+                        each(place, judgement(svm, solids, &decision));
                     }
-                }
-                for (place, _) in described() {
-                    each(place, model.judgement(&model.svm.decision(&model.sums[place])));
-                }
+                });
             }
             Self::BoostedTrees(model) => {
                 for (place, descriptor) in input.descriptors.iter().enumerate() {
@@ -240,14 +235,13 @@ fn fits_features(file: String, found: &[String]) -> Result<(), ModelError> {
     Ok(())
 }
 
-impl SolidSvm {
-    fn judgement(&self, decision: &Decision) -> Judgement {
-        let mut posterior = [0.0; 4];
-        for (place, probability) in self.svm.posterior(decision).into_iter().enumerate() {
-            posterior[self.solids[place]] = probability as f32;
-        }
-        Judgement { class: ObstacleClass::SOLIDS[self.solids[decision.winner]], posterior }
+/// What a support vector machine's decision says of the solids, given the solid of each label.
+fn judgement(svm: &Svm, solids: &[usize; MAX_CLASSES], decision: &Decision) -> Judgement {
+    let mut posterior = [0.0; 4];
+    for (place, probability) in svm.posterior(decision).into_iter().enumerate() {
+        posterior[solids[place]] = probability as f32;
     }
+    Judgement { class: ObstacleClass::SOLIDS[solids[decision.winner]], posterior }
 }
 
 fn from_naive_bayes(model: &NaiveBayes, bins: &[Bin]) -> Judgement {
