@@ -12,10 +12,10 @@ use crate::svm_file::SvmFile;
 
 /// Support vectors that are worked on at a time: their products fit into registers. Features are kept tile after tile, so
 /// that one tile's stay in the cache while several descriptors pass by.
-const TILE: usize = 128;
+const TILE: usize = 64;
 
-/// Vector registers that hold products.
-const REGISTERS: usize = 8;
+/// Vector registers that hold products, twice.
+const ABREAST: usize = 4;
 
 /// Numbers that are added side by side.
 const LANES: usize = 8;
@@ -112,7 +112,7 @@ impl Kernels {
             uses[bin.index as usize] += 1;
         }
         let (mut dense_rows, mut sparse_rows) = (0, 0);
-        let mut next = |rows: &mut u32| {
+        let next = |rows: &mut u32| {
             *rows += 1;
             *rows - 1
         };
@@ -214,18 +214,32 @@ impl WithSimd for Sum<'_> {
 fn products<S: Simd>(simd: S, dense: &[[f32; TILE]], rows: &[(u32, f32)]) -> [f32; TILE] {
     let mut result = [0.0; TILE];
     let (vectors, _) = S::as_mut_simd_f32s(&mut result);
-    for from in (0..vectors.len()).step_by(REGISTERS) {
-        let mut sums = [simd.splat_f32s(0.0); REGISTERS];
-        for &(row, weight) in rows {
-            let (values, _) = S::as_simd_f32s(&dense[row as usize]);
-            let weight = simd.splat_f32s(weight);
-            for (sum, &value) in sums.iter_mut().zip(&values[from..from + REGISTERS]) {
-                *sum = simd.add_f32s(*sum, simd.mul_f32s(weight, value));
+    for from in (0..vectors.len()).step_by(ABREAST) {
+        // Even and odd rows apart, so that additions need not wait for each other.
+        let mut sums = [[simd.splat_f32s(0.0); ABREAST]; 2];
+        let (pairs, last) = rows.as_chunks::<2>();
+        for pair in pairs {
+            for (sums, &(row, weight)) in sums.iter_mut().zip(pair) {
+                add_row(simd, sums, &dense[row as usize], from, weight);
             }
         }
-        vectors[from..from + REGISTERS].copy_from_slice(&sums);
+        for &(row, weight) in last {
+            add_row(simd, &mut sums[0], &dense[row as usize], from, weight);
+        }
+        for place in 0..ABREAST {
+            vectors[from + place] = simd.add_f32s(sums[0][place], sums[1][place]);
+        }
     }
     result
+}
+
+#[inline(always)]
+fn add_row<S: Simd>(simd: S, sums: &mut [S::f32s; ABREAST], row: &[f32; TILE], from: usize, weight: f32) {
+    let (values, _) = S::as_simd_f32s(row);
+    let weight = simd.splat_f32s(weight);
+    for (sum, &value) in sums.iter_mut().zip(&values[from..from + ABREAST]) {
+        *sum = simd.add_f32s(*sum, simd.mul_f32s(weight, value));
+    }
 }
 
 /// Sums of kernel values times each row of coefficients.

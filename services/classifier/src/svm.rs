@@ -12,7 +12,7 @@ pub const PAIRS: usize = MAX_CLASSES * (MAX_CLASSES - 1) / 2;
 
 /// Descriptors that are worked on at a time by [`Svm::decide_all`]: while they pass by, a tile of support vectors stays in
 /// the cache.
-const TOGETHER: usize = 32;
+const TOGETHER: usize = 64;
 
 /// A support vector machine with the kernel exp(−γ‖x − s‖²) (paper, Sec. V-2), voting one against one as libsvm does.
 ///
