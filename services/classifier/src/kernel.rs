@@ -10,9 +10,12 @@ use crate::exponential::exp_of_negative;
 use crate::svm::MAX_CLASSES;
 use crate::svm_file::SvmFile;
 
-/// Support vectors that are worked on at a time: their products fit into registers. Features are kept tile after tile, so
-/// that one tile's stay in the cache while several descriptors pass by.
+/// Support vectors of a tile. Features are kept tile after tile, so that one tile's stay in the first-level cache while all
+/// queries pass by.
 const TILE: usize = 64;
+
+/// Tiles of a span, for which lists of rare bins are kept: longer ones than of a tile, so that few are empty.
+const TILES: usize = 8;
 
 /// Vector registers that hold products, twice.
 const ABREAST: usize = 4;
@@ -21,16 +24,16 @@ const ABREAST: usize = 4;
 const LANES: usize = 8;
 
 /// A bin that fewer support vectors have than one in this many is kept as a list of those that have it.
-const RARE: usize = 32;
+const RARE: usize = 16;
 
 /// Where a bin's values stand.
 #[derive(Clone, Copy, Debug)]
 enum Row {
     /// No support vector has it.
     Unused,
-    /// Of these rows of each tile, which have a value for each support vector.
+    /// In this row of each tile, which has a value for each support vector.
     Dense(u32),
-    /// Of these lists of each tile.
+    /// In this list of each span.
     Sparse(u32),
 }
 
@@ -43,22 +46,29 @@ pub(crate) struct Kernels {
     arch: Arch,
     gamma: f32,
     row_of_bin: Vec<Row>,
-    /// Each holds support vectors of one class only.
-    tiles: Vec<Tile>,
+    spans: Vec<Span>,
     dense_rows: usize,
     /// Tile after tile, and in each a row for each dense bin.
     dense: Vec<[f32; TILE]>,
     sparse_rows: usize,
-    /// Tile after tile, and in each for each sparse bin, where its list begins in `sparse`; at last its end.
+    /// Span after span, and in each for each sparse bin, where its list begins in `sparse`; at last its end.
     lists: Vec<u32>,
-    /// Places in the tile, and values.
+    /// Places in the span, and values.
     sparse: Vec<(u32, f32)>,
 }
 
-/// Up to `TILE` support vectors of one class; the rest is zero, with coefficient 0.
+/// Up to `TILES` tiles of support vectors of one class.
+#[derive(Clone, Debug)]
+struct Span {
+    class: usize,
+    /// Place of the first tile's first row in `dense`.
+    first_row: usize,
+    tiles: Vec<Tile>,
+}
+
+/// What is not in rows; 0 where a class has no more support vectors.
 #[derive(Clone, Debug)]
 struct Tile {
-    class: usize,
     norm2: [f32; TILE],
     /// Against each other class: libsvm's `sv_coef`.
     coefficients: [[f64; TILE]; MAX_CLASSES - 1],
@@ -76,13 +86,15 @@ pub(crate) struct Query {
     rows: [(u32, f32); BINS],
     dense: usize,
     sparse: usize,
+    /// x·s for each support vector of a span, of rare bins alone.
+    rare: [[f32; TILE]; TILES],
     pub(crate) sums: Sums,
 }
 
 impl Query {
     pub(crate) const fn new() -> Self {
         let sums = Sums([[0.0; MAX_CLASSES - 1]; MAX_CLASSES]);
-        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, sums }
+        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, rare: [[0.0; TILE]; TILES], sums }
     }
 
     /// Takes a descriptor: bins in order of index, each index under 1728 and given once.
@@ -102,6 +114,19 @@ impl Query {
             }
         }
         self.norm2 = squared_norm(bins);
+    }
+
+    /// Makes `rare` for a span, given its lists.
+    #[inline(always)]
+    fn add_rare(&mut self, lists: &[u32], sparse: &[(u32, f32)]) {
+        let rare = self.rare.as_flattened_mut();
+        rare.fill(0.0);
+        for &(row, weight) in &self.rows[self.sparse..] {
+            let list = lists[row as usize] as usize..lists[row as usize + 1] as usize;
+            for &(place, value) in &sparse[list] {
+                rare[place as usize % (TILE * TILES)] += weight * value;
+            }
+        }
     }
 }
 
@@ -125,7 +150,7 @@ impl Kernels {
             arch: Arch::new(),
             gamma: file.gamma as f32,
             row_of_bin: uses.iter().map(row).collect(),
-            tiles: Vec::new(),
+            spans: Vec::new(),
             dense_rows: dense_rows as usize,
             dense: Vec::new(),
             sparse_rows: sparse_rows as usize,
@@ -134,34 +159,38 @@ impl Kernels {
         };
         let mut first = 0;
         for (class, &count) in file.vectors_of_class.iter().enumerate() {
-            for from in (first..first + count).step_by(TILE) {
-                kernels.add_tile(file, class, from..(from + TILE).min(first + count));
+            for from in (first..first + count).step_by(TILE * TILES) {
+                kernels.add_span(file, class, from..(from + TILE * TILES).min(first + count));
             }
             first += count;
         }
         kernels
     }
 
-    fn add_tile(&mut self, file: &SvmFile, class: usize, places: Range<usize>) {
-        let start = self.dense.len();
-        self.dense.resize(start + self.dense_rows, [0.0; TILE]);
+    fn add_span(&mut self, file: &SvmFile, class: usize, places: Range<usize>) {
+        let empty = Tile { norm2: [0.0; TILE], coefficients: [[0.0; TILE]; MAX_CLASSES - 1] };
+        let tiles = vec![empty; places.len().div_ceil(TILE)];
+        let mut span = Span { class, first_row: self.dense.len(), tiles };
+        self.dense.resize(span.first_row + span.tiles.len() * self.dense_rows, [0.0; TILE]);
         let mut lists = vec![Vec::new(); self.sparse_rows];
-        let mut tile = Tile { class, norm2: [0.0; TILE], coefficients: [[0.0; TILE]; MAX_CLASSES - 1] };
         let vectors = file.vectors[places.clone()].iter().zip(&file.coefficients[places]);
         for (place, (vector, coefficients)) in vectors.enumerate() {
+            let (tile, lane) = (place / TILE, place % TILE);
+            let first_row = span.first_row + tile * self.dense_rows;
             for bin in vector {
                 match self.row_of_bin[bin.index as usize] {
                     Row::Unused => {}
-                    Row::Dense(row) => self.dense[start + row as usize][place] = bin.weight,
+                    Row::Dense(row) => self.dense[first_row + row as usize][lane] = bin.weight,
                     Row::Sparse(row) => lists[row as usize].push((place as u32, bin.weight)),
                 }
             }
-            tile.norm2[place] = squared_norm(vector);
+            let tile = &mut span.tiles[tile];
+            tile.norm2[lane] = squared_norm(vector);
             for (of_other, &coefficient) in tile.coefficients.iter_mut().zip(coefficients) {
-                of_other[place] = coefficient;
+                of_other[lane] = coefficient;
             }
         }
-        self.tiles.push(tile);
+        self.spans.push(span);
         for list in lists {
             self.sparse.extend(list);
             self.lists.push(self.sparse.len() as u32);
@@ -185,35 +214,34 @@ impl WithSimd for Sum<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { kernels, queries } = self;
-        for (place, tile) in kernels.tiles.iter().enumerate() {
-            let dense = &kernels.dense[place * kernels.dense_rows..(place + 1) * kernels.dense_rows];
+        for (place, span) in kernels.spans.iter().enumerate() {
             let lists = &kernels.lists[place * kernels.sparse_rows..][..=kernels.sparse_rows];
             for query in &mut *queries {
-                let mut kernel = products(simd, dense, &query.rows[..query.dense]);
-                for &(row, weight) in &query.rows[query.sparse..] {
-                    let list = lists[row as usize] as usize..lists[row as usize + 1] as usize;
-                    for &(place, value) in &kernels.sparse[list] {
-                        kernel[place as usize % TILE] += weight * value;
+                query.add_rare(lists, &kernels.sparse);
+            }
+            for (place, tile) in span.tiles.iter().enumerate() {
+                let dense = &kernels.dense[span.first_row + place * kernels.dense_rows..][..kernels.dense_rows];
+                for query in &mut *queries {
+                    let mut kernel = query.rare[place];
+                    add_products(simd, &mut kernel, dense, &query.rows[..query.dense]);
+                    for (product, of_vector) in kernel.iter_mut().zip(&tile.norm2) {
+                        let distance2 = query.norm2 + of_vector - 2.0 * *product;
+                        *product = exp_of_negative(-kernels.gamma * if distance2 > 0.0 { distance2 } else { 0.0 });
                     }
-                }
-                for (product, of_vector) in kernel.iter_mut().zip(&tile.norm2) {
-                    let distance2 = query.norm2 + of_vector - 2.0 * *product;
-                    *product = exp_of_negative(-kernels.gamma * if distance2 > 0.0 { distance2 } else { 0.0 });
-                }
-                let sums = &mut query.sums.0[tile.class];
-                for (sum, part) in sums.iter_mut().zip(weighted(&kernel, &tile.coefficients)) {
-                    *sum += part;
+                    let sums = &mut query.sums.0[span.class];
+                    for (sum, part) in sums.iter_mut().zip(weighted(&kernel, &tile.coefficients)) {
+                        *sum += part;
+                    }
                 }
             }
         }
     }
 }
 
-/// x·s for each support vector of a tile, without sparse bins.
+/// Adds x·s for each support vector of a tile, without rare bins.
 #[inline(always)]
-fn products<S: Simd>(simd: S, dense: &[[f32; TILE]], rows: &[(u32, f32)]) -> [f32; TILE] {
-    let mut result = [0.0; TILE];
-    let (vectors, _) = S::as_mut_simd_f32s(&mut result);
+fn add_products<S: Simd>(simd: S, result: &mut [f32; TILE], dense: &[[f32; TILE]], rows: &[(u32, f32)]) {
+    let (vectors, _) = S::as_mut_simd_f32s(result);
     for from in (0..vectors.len()).step_by(ABREAST) {
         // Even and odd rows apart, so that additions need not wait for each other.
         let mut sums = [[simd.splat_f32s(0.0); ABREAST]; 2];
@@ -227,10 +255,10 @@ fn products<S: Simd>(simd: S, dense: &[[f32; TILE]], rows: &[(u32, f32)]) -> [f3
             add_row(simd, &mut sums[0], &dense[row as usize], from, weight);
         }
         for place in 0..ABREAST {
-            vectors[from + place] = simd.add_f32s(sums[0][place], sums[1][place]);
+            let sum = simd.add_f32s(sums[0][place], sums[1][place]);
+            vectors[from + place] = simd.add_f32s(vectors[from + place], sum);
         }
     }
-    result
 }
 
 #[inline(always)]
@@ -244,10 +272,7 @@ fn add_row<S: Simd>(simd: S, sums: &mut [S::f32s; ABREAST], row: &[f32; TILE], f
 
 /// Sums of kernel values times each row of coefficients.
 #[inline(always)]
-fn weighted(
-    kernel: &[f32; TILE],
-    coefficients: &[[f64; TILE]; MAX_CLASSES - 1],
-) -> [f64; MAX_CLASSES - 1] {
+fn weighted(kernel: &[f32; TILE], coefficients: &[[f64; TILE]; MAX_CLASSES - 1]) -> [f64; MAX_CLASSES - 1] {
     let mut lanes = [[0.0_f64; LANES]; MAX_CLASSES - 1];
     for from in (0..TILE).step_by(LANES) {
         for (lanes, coefficients) in lanes.iter_mut().zip(coefficients) {

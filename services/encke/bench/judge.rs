@@ -83,7 +83,8 @@ impl Judge {
             By::File { svm, decisions } => {
                 decisions.clear();
                 let described = input.descriptors.iter().filter(|descriptor| descriptor.bins > 0);
-                decisions.extend(described.map(|descriptor| svm.decide(&input.bins[descriptor.bin_places()])));
+                let described = described.map(|descriptor| &input.bins[descriptor.bin_places()]);
+                svm.decide_all(described, |_, _, decision| decisions.push(decision));
                 Ok(())
             }
         }

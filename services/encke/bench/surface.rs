@@ -2,14 +2,15 @@
 
 use std::hash::Hasher;
 
-use extractor::{CheckedParams, Histogram, Neighbours, column_stride, estimate_normals};
-use lidar::{MAX_RETURNS, Return};
+use extractor::{CheckedParams, Histogram, Neighbours, Phases, column_stride, estimate_normals};
+use lidar::MAX_RETURNS;
 use messages::{Bin, Clusters, MIN_FEATURE_POINTS};
 use zerocopy::IntoBytes;
 
 /// Points that the extractor looks at together: one phase of a cluster.
 struct Patch {
     points: Vec<[f32; 3]>,
+    rings: Vec<u8>,
     normals: Vec<[f32; 3]>,
     /// Kept for the histogram, which is timed without the search.
     neighbours: Neighbours,
@@ -43,14 +44,19 @@ impl Surface {
         let stride = column_stride(&clusters.header, self.spacing_rad);
         let large = clusters.clusters.iter().filter(|cluster| cluster.summary.points as usize >= MIN_FEATURE_POINTS);
         let others = self.others;
-        let patch = |points: Vec<[f32; 3]>| {
+        let patch = |(points, rings): (&[[f32; 3]], &[u8])| {
             let mut neighbours = Neighbours::new(points.len(), others);
-            neighbours.find(&points);
-            Patch { normals: vec![[0.0; 3]; points.len()], points, neighbours }
+            neighbours.find_in_rings(points, rings);
+            let normals = vec![[0.0; 3]; points.len()];
+            Patch { points: points.to_vec(), rings: rings.to_vec(), normals, neighbours }
         };
+        let mut phases = Phases::new(MAX_RETURNS);
         self.clusters = large
             .map(|cluster| &clusters.returns[cluster.summary.member_places()])
-            .map(|returns| phases(returns, stride).into_iter().map(patch).collect())
+            .map(|returns| {
+                phases.part(returns, stride);
+                phases.usable().map(patch).collect()
+            })
             .collect();
     }
 
@@ -62,7 +68,7 @@ impl Surface {
     /// Neighbours anew, in the one memory that all clusters share, as in the extractor; and normals.
     pub(super) fn normals(&mut self) {
         for patch in self.clusters.iter_mut().flatten() {
-            self.neighbours.find(&patch.points);
+            self.neighbours.find_in_rings(&patch.points, &patch.rings);
             estimate_normals(&patch.points, &self.neighbours, &mut patch.normals);
         }
     }
@@ -89,14 +95,4 @@ impl Surface {
             hash.write(patch.normals.as_bytes());
         }
     }
-}
-
-/// The phases of a cluster as `Features::describe` parts it: at the largest stride that leaves one of them enough points.
-fn phases(returns: &[Return], wanted: usize) -> Vec<Vec<[f32; 3]>> {
-    let at = |stride: usize| -> Vec<Vec<[f32; 3]>> {
-        let on = |phase| returns.iter().filter(move |r| usize::from(r.column) % stride == phase);
-        let points = (0..stride).map(|phase| on(phase).map(Return::position).collect::<Vec<_>>());
-        points.filter(|points| points.len() >= MIN_FEATURE_POINTS).collect()
-    };
-    (1..=wanted).rev().map(at).find(|phases| !phases.is_empty()).unwrap_or_default()
 }

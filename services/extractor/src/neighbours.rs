@@ -40,14 +40,7 @@ impl Neighbours {
     pub fn new(capacity: usize, others: usize) -> Self {
         let wanted = others.clamp(1, MAX_OTHERS);
         let found = Found { each: 0, near: vec![0; capacity * wanted], distance_m: vec![0.0; capacity * wanted] };
-        Self {
-            arch: Arch::new(),
-            capacity,
-            wanted,
-            blocks: Blocks::new(capacity),
-            tree: KdTree::new(capacity),
-            found,
-        }
+        Self { arch: Arch::new(), capacity, wanted, blocks: Blocks::new(capacity), tree: KdTree::new(capacity), found }
     }
 
     /// Finds the neighbours of every point [m], in any order; each has as many as were asked for, or all others where there
