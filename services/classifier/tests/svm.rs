@@ -114,3 +114,46 @@ fn a_file_cut_or_flipped_anywhere_never_panics() {
         let _ = SvmFile::parse(&flipped).map(|file| Svm::new(&file).decide(&[]));
     }
 }
+
+#[test]
+fn many_descriptors_are_decided_as_each_alone() {
+    let mut sut = Svm::new(&SvmFile::parse(&text_of(&trained(4, 400, 1.0, true))).expect("a libsvm file"));
+    for count in [0, 1, 63, 64, 65, 200] {
+        let examples = histograms(count, 5);
+        let mut found = Vec::new();
+        sut.decide_all(examples.iter().map(|(_, bins)| &bins[..]), |svm, place, decision| {
+            assert_eq!(decision, svm.decide(&examples[place].1));
+            found.push(place);
+        });
+        assert_eq!(found, (0..count).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn a_model_of_several_spans_with_common_and_rare_bins_is_summed_as_its_formula_says() {
+    // 1,100 support vectors of one class, 70 of the other; bin 3 in each, bin 100 + i in one of a few.
+    let (of_first, of_second) = (1_100, 70);
+    let mut text = format!(
+        "svm_type c_svc\nkernel_type rbf\ngamma 3\nnr_class 2\ntotal_sv {}\nrho 0.5\nlabel 1 2\nnr_sv {of_first} \
+         {of_second}\nSV\n",
+        of_first + of_second
+    );
+    let weights = |i: usize| [(3, 0.25 + (i % 8) as f32 / 16.0), (100 + i % 50, 0.5)];
+    let coefficient = |i: usize| if i < of_first { 0.5 } else { -0.25 };
+    for i in 0..of_first + of_second {
+        let [(a, x), (b, y)] = weights(i);
+        text += &format!("{} {}:{x} {}:{y} \n", coefficient(i), a + 1, b + 1);
+    }
+    let sut = Svm::new(&SvmFile::parse(&text).expect("a libsvm file"));
+    let bins = [(3, 0.5), (104, 0.25), (133, 0.125), (900, 0.125)];
+    let mut expected = -0.5;
+    for i in 0..of_first + of_second {
+        let of_vector = weights(i);
+        let weight = |of: &[(usize, f32)], bin| of.iter().find(|(b, _)| *b == bin).map_or(0.0, |(_, w)| f64::from(*w));
+        let distance2: f64 = (0..1_000).map(|bin| (weight(&bins, bin) - weight(&of_vector, bin)).powi(2)).sum();
+        expected += coefficient(i) * (-3.0 * distance2).exp();
+    }
+    let bins = bins.map(|(index, weight)| messages::Bin { index: index as u32, weight });
+    let found = sut.decide(&bins).values[0];
+    assert!((found - expected).abs() < 1e-4, "{found} is not {expected}");
+}

@@ -246,7 +246,8 @@ impl<const K: usize> Query<K> {
                 }
                 let bounds = self.bounds2(&blocks.boxes[row]);
                 for (block, &bound) in (row * ROW..count).zip(&bounds) {
-                    if bound <= self.worst2() && !seen.contains(&block) {
+                    if bound <= self.worst2() && !seen.contains(&block) && self.reaches(&blocks.boxes[row], block % ROW)
+                    {
                         self.visit(blocks, block);
                     }
                 }
@@ -278,6 +279,22 @@ impl<const K: usize> Query<K> {
             });
             (dx * dx + dy * dy) + dz * dz
         })
+    }
+
+    /// Whether any lane's point is near enough to one of the boxes: as `bounds2`, point by point.
+    #[inline(always)]
+    fn reaches(&self, boxes: &Boxes, place: usize) -> bool {
+        let mut reaches = false;
+        for lane in 0..LANES {
+            let [dx, dy, dz] = std::array::from_fn(|axis| {
+                let at = self.at[axis][lane];
+                let (above, below) = (boxes.low[axis][place] - at, at - boxes.high[axis][place]);
+                let gap = if above > below { above } else { below };
+                if gap > 0.0 { gap } else { 0.0 }
+            });
+            reaches |= (dx * dx + dy * dy) + dz * dz <= self.enough[lane];
+        }
+        reaches
     }
 
     #[inline(always)]

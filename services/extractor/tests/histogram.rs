@@ -5,7 +5,7 @@
 mod common;
 
 use common::{histogram_params, scattered, slow_histogram, sphere};
-use extractor::{Features, Params};
+use extractor::{Darboux, Features, Histogram, Neighbours, Params, estimate_normals};
 use lidar::Return;
 
 fn features(neighbours: u32) -> Features {
@@ -124,4 +124,52 @@ fn a_stride_reads_each_phase_as_a_sweep_of_its_own() {
     assert!(moved(&strided, &mean) < 0.01, "{}", moved(&strided, &mean));
     let unstrided = dense(&mut sut, &fine, 1);
     assert!(moved(&strided, &unstrided) > 0.2, "the stride must matter: {}", moved(&strided, &unstrided));
+}
+
+/// Pair after pair, without lanes: the same sums in the same order.
+fn one_by_one(points: &[[f32; 3]], normals: &[[f32; 3]], neighbours: &Neighbours) -> Vec<(u32, f32)> {
+    let mut share = vec![1.0_f32; points.len()];
+    for index in 0..points.len() {
+        let others = neighbours.of(index);
+        for (&other, &distance_m) in others.iter().zip(neighbours.distances_m(index)) {
+            share[other as usize] += 1.0 / (distance_m.max(1e-3) * others.len() as f32);
+        }
+    }
+    let (mut weights, mut total) = (vec![0.0_f64; 1_728], 0.0);
+    for index in 0..points.len() {
+        for (&other, &distance_m) in neighbours.of(index).iter().zip(neighbours.distances_m(index)) {
+            let other = other as usize;
+            let offset = std::array::from_fn(|axis| points[other][axis] - points[index][axis]);
+            if let Some(pair) = Darboux::between(normals[index], normals[other], offset, distance_m) {
+                weights[pair.bin()] += f64::from(share[index]);
+                total += f64::from(share[index]);
+            }
+        }
+    }
+    let scale = 1.0 / total;
+    let held = weights.iter().zip(0..).filter(|(weight, _)| **weight > 0.0);
+    held.map(|(weight, bin)| (bin, (weight * scale) as f32)).collect()
+}
+
+#[test]
+fn pairs_side_by_side_give_the_bits_of_pairs_one_by_one() {
+    let line = |count: usize| (0..count).map(|i| [5.0, i as f32 * 0.01, 1.0]).collect::<Vec<_>>();
+    let ring: Vec<[f32; 3]> = (0..200)
+        .map(|i| (i as f32 * 0.0126, 6.0 + (i % 7) as f32 * 0.01))
+        .map(|(angle, range)| [range * angle.cos(), range * angle.sin(), 0.7])
+        .collect();
+    let mut clusters = vec![vec![[1.0, 2.0, 3.0]; 40], line(5), line(300), ring, scattered(50_000, 8, None)];
+    clusters.extend([5, 6, 15, 16, 17, 33, 500].map(|count| scattered(count, count as u64, None)));
+    clusters.push(scattered(700, 2, Some(0.25)));
+    for points in clusters {
+        for others in [2, 4, 5] {
+            let (mut neighbours, mut normals) = (Neighbours::new(points.len(), others), vec![[0.0; 3]; points.len()]);
+            neighbours.find(&points);
+            estimate_normals(&points, &neighbours, &mut normals);
+            let mut sut = Histogram::new(points.len());
+            sut.add(&points, &normals, &neighbours);
+            let found: Vec<(u32, f32)> = sut.bins().map(|bin| (bin.index, bin.weight)).collect();
+            assert_eq!(found, one_by_one(&points, &normals, &neighbours), "{} points", points.len());
+        }
+    }
 }

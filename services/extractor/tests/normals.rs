@@ -86,3 +86,16 @@ fn where_no_normal_is_determined_the_view_direction_stands_in() {
     }
     assert_eq!(normals(&[[0.0; 3]; 5]), [[0.0, 0.0, 1.0]; 5]);
 }
+
+#[test]
+fn a_normal_does_not_depend_on_the_points_beside_it() {
+    // Points are worked on in groups; another first point shifts all groups.
+    for count in [5, 8, 9, 40, 500] {
+        let points = scattered(count, count as u64, Some(0.25));
+        let mut shifted = vec![[-40.0, 7.0, 3.0]];
+        shifted.extend(&points);
+        // Far enough to be nobody's neighbour, but for the smallest clusters.
+        let with_another = if count > 5 { normals(&shifted)[1..].to_vec() } else { normals(&points) };
+        assert_eq!(with_another, normals(&points), "{count} points");
+    }
+}
