@@ -225,8 +225,8 @@ impl<const K: usize> Query<K> {
             let other = blocks.index[block][place];
             let distance2 = self.distances2(blocks, block, place);
             let mut near = false;
-            for lane in 0..LANES {
-                near |= distance2[lane] <= self.enough[lane];
+            for (distance2, enough) in distance2.iter().zip(&self.enough) {
+                near |= distance2 <= enough;
             }
             if near {
                 self.insert(distance2.map(|distance2| joined(distance2, other)));

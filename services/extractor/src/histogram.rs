@@ -148,8 +148,8 @@ impl Group {
 
     #[inline(always)]
     fn put(&mut self, lane: usize, vector: [f32; 3]) {
-        for axis in 0..3 {
-            self.0[axis][lane] = vector[axis];
+        for (values, value) in self.0.iter_mut().zip(vector) {
+            values[lane] = value;
         }
     }
 

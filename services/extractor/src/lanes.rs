@@ -37,7 +37,7 @@ impl Lanes {
         result
     }
 
-    /// Whether each is greater, 1 or 0.
+    /// Whether each is greater than the other.
     #[inline(always)]
     pub(crate) fn greater(self, other: Self) -> [bool; LANES] {
         std::array::from_fn(|lane| self.0[lane] > other.0[lane])
@@ -46,15 +46,15 @@ impl Lanes {
     /// Whether each is neither 0, nor so small that its digits are fewer, nor infinite, nor no number.
     #[inline(always)]
     pub(crate) fn is_normal(self) -> [bool; LANES] {
-        self.0.map(|value| (value >= f64::MIN_POSITIVE) & (value < f64::INFINITY))
+        self.0.map(|value| (f64::MIN_POSITIVE..f64::INFINITY).contains(&value))
     }
 
     /// These where chosen, else the others.
     #[inline(always)]
     pub(crate) fn or(self, chosen: [bool; LANES], other: Self) -> Self {
         let mut result = other;
-        for lane in 0..LANES {
-            result.0[lane] = if chosen[lane] { self.0[lane] } else { other.0[lane] };
+        for ((result, own), chosen) in result.0.iter_mut().zip(self.0).zip(chosen) {
+            *result = if chosen { own } else { *result };
         }
         result
     }
