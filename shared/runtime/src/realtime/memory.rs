@@ -51,20 +51,19 @@ impl LockPlan {
         Self { bytes: mapped_bytes() + Self::to_be_mapped(chain, process) + SPARE }
     }
 
-    /// The plan of a process that does not run yet, from what this one has mapped.
+    /// The plan of a process that does not run yet, from what this one has mapped. Never less than what the process will
+    /// reckon itself: its writer's segment may be mapped by then, and its threads have heaps of their own.
     pub fn foreseen(chain: &Chain, process: &str) -> Self {
-        let queue_parts = chain.queue_parts;
-        let written: u64 = if process == crate::SOURCE {
-            [Segment::of::<Sweep>(queue_parts), Segment::of::<Truth>(queue_parts)]
-                .iter()
-                .map(Segment::virtual_bytes)
-                .sum()
-        } else {
-            let stage = chain.stages.iter().find(|stage| stage.name == process);
-            let message = stage.and_then(|stage| stage.writes.as_deref());
-            message.and_then(|message| segment_of(message, queue_parts)).map_or(0, |segment| segment.virtual_bytes())
+        let stage = chain.stages.iter().find(|stage| stage.name == process);
+        let bytes_of =
+            |message: &str| segment_of(message, chain.queue_parts).map_or(0, |segment| segment.virtual_bytes());
+        let written = match stage {
+            Some(stage) => stage.writes.as_deref().map_or(0, bytes_of),
+            None if process == crate::SOURCE => bytes_of("Sweep") + bytes_of("Truth"),
+            None => 0,
         };
-        Self { bytes: mapped_bytes() + written + Self::to_be_mapped(chain, process) + SPARE }
+        let read = stage.map_or(0, |stage| bytes_of(&stage.reads));
+        Self { bytes: mapped_bytes() + written + read + Self::to_be_mapped(chain, process) + 3 * SPARE }
     }
 
     /// What a reader maps: its writer's segment, and that of the writer's successor before the old one is let go.

@@ -4,7 +4,11 @@ use preempt_rt::sched::{
     Pid, PreemptRtError, Scheduler, SchedulerParams, get_scheduler, get_scheduler_params, set_scheduler,
 };
 use rustix::process::{Resource, getrlimit};
-use rustix::thread::{CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity};
+use rustix::thread::CapabilitySet;
+use rustix::thread::CpuSet;
+use rustix::thread::capabilities;
+use rustix::thread::sched_getaffinity;
+use rustix::thread::sched_setaffinity;
 
 use super::{Refusal, Setting};
 
