@@ -10,7 +10,7 @@ use rustix::process::{Resource, getrlimit};
 use super::Check;
 
 const MIB: u64 = 1 << 20;
-/// Files that a process of the chain has open at most: measured 44, in the supervisor.
+/// Files that a process of the chain has open at most: measured 48, in a stage between two others.
 const OPEN_FILES: u64 = 128;
 
 pub(super) fn checks(chain: &Chain) -> Vec<Check> {
