@@ -55,6 +55,8 @@ fn bench(c: &mut Criterion) {
         "to nowhere",
         Settings { detections: Some("/dev/null".into()), labels: Some("/dev/null".into()), ..settings() },
     );
+    // Not lossless: that would measure the trace's writer.
+    bench("trace to nowhere", Settings { trace: Some("/dev/null".into()), lossless: false, ..settings() });
     bench("detections file", Settings { detections: file("a"), ..settings() });
     bench("both files", Settings { detections: file("b"), labels: file("c"), ..settings() });
 }

@@ -113,8 +113,8 @@ fn write_deadline(text: &mut String, report: &Report) -> std::fmt::Result {
     let deadline = &report.deadline;
     write!(text, "deadline {} ms: {} misses", deadline.deadline_ms, deadline.misses)?;
     if let Some(margin) = deadline.margin_p999_pct {
-        let judged = if deadline.margin_ok == Some(true) { "flight practice: at least" } else { "SHORT of" };
-        write!(text, ", margin at p99.9 {margin:.0} % ({judged} {LEAST_MARGIN_PCT} %)")?;
+        let short = if deadline.margin_ok == Some(true) { "" } else { "SHORT of " };
+        write!(text, ", margin at p99.9 {margin:.0} % ({short}flight practice: {LEAST_MARGIN_PCT} %)")?;
     }
     writeln!(text)?;
     for (cause, misses) in &deadline.causes {
