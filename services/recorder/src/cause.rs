@@ -1,7 +1,8 @@
 //! Why a sweep was late: one stage, and one kind of delay.
 //!
 //! Every nanosecond from the last return's due time to the answer is charged to a stage and a [`Kind`], and the largest
-//! charge is the cause. Time in a queue is charged to what the stage did meanwhile with the parts before.
+//! charge is the cause. Where that is time in a queue, the cause is what the stage did most of that time with the parts
+//! before.
 
 use messages::{MAX_HOPS, Trace};
 
@@ -44,6 +45,17 @@ impl Kind {
 /// Time by [`Kind`] [ns].
 pub(crate) type Shares = [u64; Kind::ALL.len()];
 
+/// The largest share; of equals the first in the order of the kinds.
+fn largest(shares: &Shares) -> (u64, Kind) {
+    let mut largest = (0, Kind::Late);
+    for (&share_ns, kind) in shares.iter().zip(Kind::ALL) {
+        if share_ns > largest.0 {
+            largest = (share_ns, kind);
+        }
+    }
+    largest
+}
+
 /// The stage, by its position, and the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Cause {
@@ -82,27 +94,31 @@ impl Judge {
             return Cause { stage, kind: Kind::Restart };
         }
         let mut longest = (0, Cause { stage: 0, kind: Kind::Late });
+        let mut waits = None;
         let mut sent_ns = 0;
-        for (stage, hop) in trace.hops().iter().enumerate() {
+        for (stage, (hop, own)) in trace.hops().iter().zip(&segments.hops).enumerate() {
             let mut shares = Shares::default();
             if stage == 0 {
                 shares[Kind::Late as usize] = segments.source_late_ns - segments.source_taken_ns;
                 shares[Kind::CpuTaken as usize] = segments.source_taken_ns;
             } else {
-                self.histories[stage].charge_queue(hop, sent_ns, &mut shares);
-                let own = &segments.hops[stage];
-                shares[Kind::WakeUp as usize] += own.wake_ns();
-                shares[Kind::Compute as usize] += own.compute_ns();
-                shares[Kind::CpuTaken as usize] += own.taken_ns();
+                shares[Kind::Queueing as usize] = own.queued_ns;
+                shares[Kind::WakeUp as usize] = own.wake_ns();
+                shares[Kind::Compute as usize] = own.compute_ns();
+                shares[Kind::CpuTaken as usize] = own.taken_ns();
             }
-            for kind in Kind::ALL {
-                if shares[kind as usize] > longest.0 {
-                    longest = (shares[kind as usize], Cause { stage, kind });
-                }
+            let (share_ns, kind) = largest(&shares);
+            if share_ns > longest.0 {
+                longest = (share_ns, Cause { stage, kind });
+                waits = (kind == Kind::Queueing).then_some((hop, sent_ns));
             }
             sent_ns = hop.finished_ns;
         }
-        longest.1
+        let (_, mut cause) = longest;
+        if let Some((hop, sent_ns)) = waits {
+            (_, cause.kind) = largest(&self.histories[cause.stage].charge_queue(hop, sent_ns));
+        }
+        cause
     }
 
     /// Remembers a part.

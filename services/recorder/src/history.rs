@@ -53,10 +53,10 @@ impl History {
 
     /// Charges the time that a part, not noted yet, had to queue: to the parts before, to a restart, and what neither
     /// explains to queueing itself.
-    pub(crate) fn charge_queue(&self, hop: &Hop, sent_ns: u64, shares: &mut Shares) {
+    pub(crate) fn charge_queue(&self, hop: &Hop, sent_ns: u64) -> Shares {
         let queue = (sent_ns, hop.free_ns.min(hop.received_ns));
-        let before = shares.iter().sum::<u64>();
-        shares[Kind::Restart as usize] += overlap_ns(queue, self.down_before(hop));
+        let mut shares = Shares::default();
+        shares[Kind::Restart as usize] = overlap_ns(queue, self.down_before(hop));
         for span in self.spans.iter().rev() {
             let (wait_ns, busy_ns) = (overlap_ns(queue, span.wait), overlap_ns(queue, span.busy));
             let (before_ns, within_ns) = (span.taken_before_ns.min(wait_ns), span.taken_busy_ns.min(busy_ns));
@@ -68,8 +68,9 @@ impl History {
                 break;
             }
         }
-        let explained = shares.iter().sum::<u64>() - before;
-        shares[Kind::Queueing as usize] += queue.1.saturating_sub(queue.0).saturating_sub(explained);
+        let explained = shares.iter().sum::<u64>();
+        shares[Kind::Queueing as usize] = queue.1.saturating_sub(queue.0).saturating_sub(explained);
+        shares
     }
 
     /// When nobody was there, if the part is the first of a new life.

@@ -141,6 +141,28 @@ fn a_queue_is_charged_to_the_longest_of_what_happened_in_it_not_before() {
 
 // verifies REC-013
 #[test]
+fn the_stage_that_held_up_a_sweep_is_the_cause_not_the_one_that_worked_off_the_rush_behind_it() {
+    // The clusterer stood still until 1.3 s; then all three came to the extractor at once, which takes 50 ms for each.
+    let held = |number: u64| {
+        let (due_ms, at_ms) = (1_000 + 100 * number, 1_300 + number);
+        let free_ms = if number == 0 { 0 } else { at_ms };
+        let begin_ms = 1_301 + 50 * number;
+        let extractor_free_ms = if number == 0 { 0 } else { begin_ms };
+        sweep(
+            number,
+            &[
+                hop([0, due_ms - 50, due_ms - 50, due_ms]),
+                hop([free_ms, at_ms, at_ms, at_ms + 1]),
+                hop([extractor_free_ms, begin_ms, begin_ms, begin_ms + 50]),
+            ],
+        )
+    };
+    // The last one waited for 102 ms for the clusterer and 98 ms for the extractor, and for another 50 ms of its work.
+    check(&[held(0), held(1), held(2)], &[("clusterer wake-up", 3)]);
+}
+
+// verifies REC-013
+#[test]
 fn a_backlog_of_many_short_parts_is_their_work() {
     // Four sectors come at once (a torn recording): the last waits for the work on the others, 40 ms each.
     let part = |sector: u64| {
