@@ -14,18 +14,28 @@ const NOBODY: u32 = u32::MAX;
 const REACH: usize = 2;
 /// Columns within reach, the cell's own included.
 const COLUMNS: usize = 2 * REACH + 1;
+/// Beyond all spots.
+const NO_SPOT: usize = usize::MAX;
 /// Columns from two before the sweep to two past it.
 const MOST_SPOTS: usize = MAX_COLUMNS + 2 * REACH;
 
-/// The other cells of a member's square as (rings, columns) away, nearest first.
-#[rustfmt::skip]
-const NEAREST_FIRST: [(isize, isize); 24] = [
-    (-1, 0), (0, -1), (0, 1), (1, 0),
-    (-1, -1), (-1, 1), (1, -1), (1, 1),
-    (-2, 0), (0, -2), (0, 2), (2, 0),
-    (-2, -1), (-2, 1), (-1, -2), (-1, 2), (1, -2), (1, 2), (2, -1), (2, 1),
-    (-2, -2), (-2, 2), (2, -2), (2, 2),
-];
+/// The other cells of the square round one, those equally near together, nearest first: a bit a cell, ring by ring and
+/// column after column.
+const NEAREST_FIRST: [u32; 5] = [at_distance(1), at_distance(2), at_distance(4), at_distance(5), at_distance(8)];
+
+/// The cells of the square at a sum of squares of rings and columns.
+const fn at_distance(sum: isize) -> u32 {
+    let (mut cells, mut bit) = (0, 0);
+    while bit < COLUMNS * COLUMNS {
+        let columns = (bit / COLUMNS) as isize - REACH as isize;
+        let rings = (bit % COLUMNS) as isize - REACH as isize;
+        if columns * columns + rings * rings == sum {
+            cells |= 1 << bit;
+        }
+        bit += 1;
+    }
+    cells
+}
 
 /// Finds the cells. Columns are numbered by *spot*: two before the sweep's first, so that those exist too.
 ///
@@ -116,7 +126,7 @@ impl Cells {
         let places = cluster.summary.member_places();
         let (mut low, mut high) = (usize::MAX, 0);
         field.cluster = cluster.summary.key;
-        let mut newest = usize::MAX;
+        let mut newest = NO_SPOT;
         for r in &output.returns[places.clone()] {
             let spot = usize::from(r.column) + REACH;
             self.members[spot] |= 1 << r.ring;
@@ -138,8 +148,13 @@ impl Cells {
                 bits &= bits - 1;
             }
         }
+        newest = NO_SPOT;
         for r in &output.returns[places] {
-            self.members[usize::from(r.column) + REACH] = 0;
+            let spot = usize::from(r.column) + REACH;
+            if spot != newest {
+                self.members[spot] = 0;
+            }
+            newest = spot;
         }
         fits
     }
@@ -191,22 +206,24 @@ impl Cells {
 
     /// Place of the member nearest to a cell; of those equally near the smallest.
     fn nearest_member(&self, field: &Field, around: &Around, ring: usize) -> Option<usize> {
-        let mut best: Option<(isize, usize)> = None;
-        for (rings, columns) in NEAREST_FIRST {
-            let distance = rings * rings + columns * columns;
-            if best.is_some_and(|(nearest, _)| distance > nearest) {
-                break;
-            }
-            let Some(ring) = ring.checked_add_signed(rings).filter(|&ring| ring < field.rings) else { continue };
-            let place = (columns + REACH as isize) as usize;
-            if around.members[place] & (1 << ring) == 0 {
-                continue;
-            }
-            let Some(column) = around.received[place] else { continue };
-            let place = self.returns_at(field, ring, column).find(|&place| field.cluster_of[place] == field.cluster);
-            best = best.into_iter().chain(place.map(|place| (distance, place))).min();
+        let mut square = 0_u32;
+        for (place, &members) in around.members.iter().enumerate() {
+            // Two rings below the first, so that those exist too.
+            let rings = (u128::from(members) << REACH >> ring) as u32 & ((1 << COLUMNS) - 1);
+            square |= rings << (COLUMNS * place);
         }
-        best.map(|(_, place)| place)
+        let mut nearest = NEAREST_FIRST.iter().map(|cells| cells & square).find(|&cells| cells != 0)?;
+        let mut best = None;
+        while nearest != 0 {
+            let bit = nearest.trailing_zeros() as usize;
+            let (columns, rings) = (bit / COLUMNS, bit % COLUMNS);
+            let column = around.received[columns]?;
+            let mut there = self.returns_at(field, ring + rings - REACH, column);
+            let place = there.find(|&place| field.cluster_of[place] == field.cluster);
+            best = best.into_iter().chain(place).min();
+            nearest &= nearest - 1;
+        }
+        best
     }
 
     /// Places of the returns of a firing, in order.

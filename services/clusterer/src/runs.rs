@@ -17,18 +17,20 @@ pub(crate) const BLOCK_COLUMNS: usize = 16;
 /// Boxes and returns looked at together: a multiple of every vector width in use.
 pub(crate) const LANES: usize = 8;
 
-/// Neighbouring runs: their boxes [m] and their sets.
+/// Neighbouring boxes [m] and their sets: of runs, or of chunks of runs.
 #[derive(Clone, Copy)]
 struct Chunk {
     low_m: [[f32; LANES]; 3],
     high_m: [[f32; LANES]; 3],
-    /// A run of the set of each, as last seen.
+    /// A run of the set that all of each is in, as last seen; [`MIXED`] where not all is known to be in one.
     set: [u32; LANES],
 }
 
+/// More than one set, or none.
+const MIXED: u32 = u32::MAX;
 /// Nothing overlaps an empty box.
 const EMPTY: Chunk =
-    Chunk { low_m: [[f32::INFINITY; LANES]; 3], high_m: [[f32::NEG_INFINITY; LANES]; 3], set: [0; LANES] };
+    Chunk { low_m: [[f32::INFINITY; LANES]; 3], high_m: [[f32::NEG_INFINITY; LANES]; 3], set: [MIXED; LANES] };
 
 /// A run as far as its returns say.
 #[derive(Clone, Copy)]
@@ -61,6 +63,8 @@ pub(crate) struct Seeker {
 /// The runs of a sweep and their returns.
 pub(crate) struct Runs {
     chunks: Vec<Chunk>,
+    /// The boxes of the chunks.
+    groups: Vec<Chunk>,
     /// Place of the first return of each run in what follows, and the end of the last.
     first: Vec<u32>,
     x_m: Vec<f32>,
@@ -94,6 +98,7 @@ impl Runs {
     pub(crate) fn new() -> Self {
         Self {
             chunks: Vec::with_capacity(MAX_RETURNS.div_ceil(LANES)),
+            groups: Vec::with_capacity(MAX_RETURNS.div_ceil(LANES * LANES)),
             first: Vec::with_capacity(MAX_RETURNS + 1),
             x_m: Vec::with_capacity(MAX_RETURNS + LANES),
             y_m: Vec::with_capacity(MAX_RETURNS + LANES),
@@ -108,6 +113,7 @@ impl Runs {
     /// Forgets the sweep before.
     pub(crate) fn reset(&mut self) {
         self.chunks.clear();
+        self.groups.clear();
         self.first.clear();
         self.first.push(0);
         self.place.clear();
@@ -208,18 +214,16 @@ impl Runs {
 
     fn push_boxes(&mut self, first_run: u32) {
         let mut start = self.place.len() as u32;
-        for (number, run) in (first_run..).zip(&self.block) {
-            let lane = number as usize % LANES;
+        for (number, run) in (first_run as usize..).zip(&self.block) {
+            let (chunk, lane) = (number / LANES, number % LANES);
             if lane == 0 {
                 self.chunks.push(EMPTY);
             }
-            if let Some(chunk) = self.chunks.last_mut() {
-                for axis in 0..3 {
-                    chunk.low_m[axis][lane] = run.low_m[axis];
-                    chunk.high_m[axis][lane] = run.high_m[axis];
-                }
-                chunk.set[lane] = number;
+            if number % (LANES * LANES) == 0 {
+                self.groups.push(EMPTY);
             }
+            self.chunks[chunk].widen(lane, run, number as u32);
+            self.groups[chunk / LANES].widen(chunk % LANES, run, MIXED);
             self.first.push(start);
             start += run.points;
         }
@@ -247,14 +251,41 @@ impl Runs {
         within_m2: f32,
         mut root: u32,
     ) -> u32 {
-        let chunks = others.start as usize / LANES..(others.end as usize).div_ceil(LANES);
-        for number in chunks.rev() {
-            let candidates = seeker.candidates(&self.chunks[number], root);
+        let groups = others.start as usize / (LANES * LANES)..(others.end as usize).div_ceil(LANES * LANES);
+        for number in groups.rev() {
+            let candidates = seeker.candidates(&self.groups[number], root);
             if candidates != 0 {
-                root = self.join_chunk(sets, run, number, candidates, within_m2, root);
+                root = self.join_group(sets, run, seeker, number, candidates, within_m2, root);
             }
         }
         self.chunks[run as usize / LANES].set[run as usize % LANES] = root;
+        root
+    }
+
+    #[inline(always)]
+    fn join_group(
+        &mut self,
+        sets: &mut Sets,
+        run: u32,
+        seeker: Seeker,
+        number: usize,
+        mut candidates: u32,
+        within_m2: f32,
+        mut root: u32,
+    ) -> u32 {
+        while candidates != 0 {
+            let lane = candidates.ilog2() as usize;
+            candidates &= !(1 << lane);
+            let chunk = number * LANES + lane;
+            let in_chunk = seeker.candidates(&self.chunks[chunk], root);
+            if in_chunk != 0 {
+                root = self.join_chunk(sets, run, chunk, in_chunk, within_m2, root);
+            }
+            let set = self.chunks[chunk].set;
+            if set.iter().all(|&set| set == root) {
+                self.groups[number].set[lane] = root;
+            }
+        }
         root
     }
 
@@ -269,7 +300,7 @@ impl Runs {
         mut root: u32,
     ) -> u32 {
         while candidates != 0 {
-            let lane = LANES - 1 - (candidates.leading_zeros() as usize - (32 - LANES));
+            let lane = candidates.ilog2() as usize;
             candidates &= !(1 << lane);
             let other = (number * LANES + lane) as u32;
             let mut there = sets.root(self.chunks[number].set[lane]);
@@ -305,6 +336,17 @@ impl Runs {
             let is_within = squared_m2([x_m[lane], y_m[lane], z_m[lane]], position) <= within_m2;
             any | (is_within & ((lane as u32) < left))
         })
+    }
+}
+
+impl Chunk {
+    /// Widens the box of a lane by that of a run.
+    fn widen(&mut self, lane: usize, run: &Run, set: u32) {
+        for axis in 0..3 {
+            let (low_m, high_m) = (&mut self.low_m[axis][lane], &mut self.high_m[axis][lane]);
+            (*low_m, *high_m) = (min(*low_m, run.low_m[axis]), max(*high_m, run.high_m[axis]));
+        }
+        self.set[lane] = set;
     }
 }
 
