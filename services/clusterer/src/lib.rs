@@ -24,9 +24,11 @@
 //! ```
 
 mod arcsine;
+mod boxes;
 mod cells;
 mod clusterer;
 mod distance;
+mod field;
 mod gather;
 mod input;
 mod params;

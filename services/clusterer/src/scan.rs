@@ -145,6 +145,11 @@ impl Scan {
         }
     }
 
+    /// d and its rounding [m], and d² [m²].
+    fn within(&self) -> (f32, f32) {
+        (self.range_d_m * ROUNDING, self.range_d_m * self.range_d_m)
+    }
+
     fn least_m2(&self, factor: f32) -> f32 {
         (factor * self.range_d_m) * (factor * self.range_d_m)
     }
@@ -171,8 +176,7 @@ impl Scan {
 
     /// Joins a run of the newest block with all before it that it has a return within d of.
     fn look_back(&mut self, sets: &mut Sets, run: u32, least_h_m2: f32) {
-        let within_m2 = self.range_d_m * self.range_d_m;
-        let seeker = self.runs.seeker(run, self.range_d_m * ROUNDING);
+        let within = self.within();
         let earliest_rad = self.earliest_rad[run as usize];
         let newest = self.blocks.len() - 1;
         self.blocks[newest].earliest_rad = self.blocks[newest].earliest_rad.min(earliest_rad);
@@ -181,7 +185,7 @@ impl Scan {
             block -= 1;
         }
         let mut root = sets.root(run);
-        root = self.runs.join(sets, run, seeker, self.blocks[block].first_run..run, within_m2, root);
+        root = self.runs.join(sets, run, (self.blocks[block].first_run, run), within, root);
         // Close returns are anywhere in the sweep, and so are their neighbours.
         let elsewhere = match least_h_m2 {
             h_m2 if h_m2 <= self.least_m2(CLOSE) => &self.near_blocks,
@@ -189,14 +193,14 @@ impl Scan {
             _ => return,
         };
         for &other in elsewhere.iter().take_while(|&&other| (other as usize) < block) {
-            let runs = self.blocks[other as usize].first_run..self.blocks[other as usize + 1].first_run;
-            root = self.runs.join(sets, run, seeker, runs, within_m2, root);
+            let runs = (self.blocks[other as usize].first_run, self.blocks[other as usize + 1].first_run);
+            root = self.runs.join(sets, run, runs, within, root);
         }
     }
 
     /// Joins the runs just after the seam with those just before it.
     fn join_seam(&mut self, sets: &mut Sets) {
-        let (within_m2, end_rad) = (self.range_d_m * self.range_d_m, self.reached_rad());
+        let (within, end_rad) = (self.within(), self.reached_rad());
         for number in 0..self.blocks.len() {
             if self.blocks[number].earliest_rad + TAU > end_rad {
                 continue;
@@ -211,10 +215,9 @@ impl Scan {
                 while block > number && self.blocks[block - 1].reached_rad >= earliest_rad {
                     block -= 1;
                 }
-                let seeker = self.runs.seeker(run, self.range_d_m * ROUNDING);
                 let root = sets.root(run);
-                let others = self.blocks[block].first_run..self.runs.len() as u32;
-                self.runs.join(sets, run, seeker, others, within_m2, root);
+                let others = (self.blocks[block].first_run, self.runs.len() as u32);
+                self.runs.join(sets, run, others, within, root);
             }
         }
     }
