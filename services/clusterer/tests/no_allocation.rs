@@ -10,8 +10,9 @@ use std::f64::consts::PI;
 
 use clusterer::Method::{Auto, Kdtree, Scan};
 use common::scanner::Scanner;
+use common::sectors::Sender;
 use common::{WHOLE, cloud, empty_turn, room};
-use messages::{Clusters, Message, Sweep};
+use messages::{Clusters, Cutter, Message, Sweep};
 use stage::Stage;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 use zerocopy::FromZeros;
@@ -33,6 +34,24 @@ fn scans(method: clusterer::Method, sweep: &Sweep) -> bool {
     change.allocations + change.reallocations + change.deallocations == 0
 }
 
+/// Whether the heap is left alone by sweeps in sectors.
+fn scans_in_sectors(sweep: &mut Sweep, sectors: u32) -> bool {
+    Cutter::new(sectors).measure(sweep);
+    assert!(sweep.header.stray_rad > 0.0);
+    let mut sender = Sender::new(room(Auto, 1.0));
+    let region = Region::new(GLOBAL);
+    let mut returns = 0;
+    for _ in 0..2 {
+        for sector in 0..sectors {
+            sender.send_quietly(sweep, sectors, sector);
+            returns += sender.output.returns.len();
+        }
+    }
+    let change = region.change();
+    assert_eq!(returns, 2 * sweep.returns.len());
+    change.allocations + change.reallocations + change.deallocations == 0
+}
+
 // verifies CLU-009, CLU-011
 #[test]
 fn regular_sweeps_are_scanned_without_allocating_and_others_go_to_the_tree() {
@@ -49,6 +68,10 @@ fn regular_sweeps_are_scanned_without_allocating_and_others_go_to_the_tree() {
         let sweep = scanner.sweep();
         assert!(scans(Auto, &sweep) && scans(Scan, &sweep), "{scanner:?}");
         assert!(!scans(Kdtree, &sweep));
+    }
+    for sectors in [1, 7, 36, 180] {
+        let mut sweep = Scanner { missing: 0.1, walls_m: None, obstacles: 60, ..plain.clone() }.sweep();
+        assert!(scans_in_sectors(&mut sweep, sectors), "{sectors} sectors");
     }
     assert!(scans(Auto, &empty_turn(32, 4_608)));
     // A ring whose returns stray by more than 0.1 rad: exact in the window, but slow.

@@ -11,7 +11,7 @@ use clusterer::validation::brute_force_roots;
 use common::scanner::Scanner;
 use common::sectors::{Sender, assert_same_in_sectors};
 use common::{empty_turn, put, room};
-use messages::{Cutter, Refusal, Sweep};
+use messages::{Cutter, Refusal, Sweep, Verdict};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rand::{RngExt, SeedableRng};
@@ -151,8 +151,11 @@ fn edge(columns: usize, first: usize, apart: usize, swap: bool) -> Box<Sweep> {
     let mut sweep = empty_turn(1, columns);
     sweep.rings[0].elevation_rad = 0.0;
     let (a, b) = if swap { (near, far) } else { (far, near) };
-    put(&mut sweep, 0, first, a);
-    put(&mut sweep, 0, first + apart, b);
+    let mut pair = [(first, a), ((first + apart) % columns, b)];
+    pair.sort_by_key(|&(column, _)| column);
+    for (column, range_m) in pair {
+        put(&mut sweep, 0, column, range_m);
+    }
     sweep
 }
 
@@ -170,6 +173,55 @@ fn a_neighbour_at_the_very_edge_of_the_window_is_waited_for() {
                 assert_eq!(closed.len(), 1, "{apart} columns apart from {first}");
             }
         }
+    }
+}
+
+// verifies CLU-013
+#[test]
+fn what_a_header_says_of_the_step_does_not_part_neighbours() {
+    const COLUMNS: usize = 720;
+    let mut sender = Sender::new(room(Method::Auto, 1.0));
+    for factor in [10.0, 0.1] {
+        for apart in [2, 10, 33, 60, 120, 150] {
+            for first in [100, 191, 300, COLUMNS - 1, COLUMNS - apart / 2, COLUMNS - apart + 1] {
+                for swap in [false, true] {
+                    let mut sweep = edge(COLUMNS, first, apart, swap);
+                    sweep.header.column_step_rad *= factor;
+                    assert_same_in_sectors(&mut sender, &mut sweep, &[COLUMNS as u32]);
+                    let closed = sender.send_all(&sweep, COLUMNS as u32);
+                    assert_eq!(closed.len(), 1, "{apart} columns apart from {first}, step times {factor}");
+                }
+            }
+        }
+    }
+}
+
+// verifies CLU-013
+#[test]
+fn a_last_sector_without_columns_changes_nothing() {
+    const SECTORS: u32 = 10;
+    let mut sender = Sender::new(room(Method::Auto, 0.1));
+    for column in 130..160 {
+        let mut sweep = empty_turn(1, 160);
+        put(&mut sweep, 0, column, 50.0);
+        Cutter::new(SECTORS).measure(&mut sweep);
+        let whole = sender.send_all(&sweep, 1);
+        let mut closed = Vec::new();
+        for sector in 0..=SECTORS {
+            sender.cut(&sweep, SECTORS, sector.min(SECTORS - 1));
+            if sector >= SECTORS - 1 {
+                sender.piece.header.complete = u32::from(sector == SECTORS);
+            }
+            if sector == SECTORS {
+                (sender.piece.first_column, sender.piece.first_return, sender.piece.header.recorded) = (160, 1, 0);
+                sender.piece.columns.clear();
+                sender.piece.returns.clear();
+            }
+            assert_eq!(sender.send(SECTORS + 1, sector), Verdict::Complete);
+            sender.closed(sector, &mut closed);
+        }
+        assert_eq!(closed.len(), 1);
+        assert!(closed[0].bytes() == whole[0].bytes(), "column {column}: {:?}", closed[0].cluster);
     }
 }
 

@@ -71,6 +71,13 @@ impl Sender {
         self.send(sectors, sector)
     }
 
+    /// Sends one sector of a measured sweep and looks at nothing.
+    pub(crate) fn send_quietly(&mut self, whole: &Sweep, sectors: u32, sector: u32) {
+        self.cut(whole, sectors, sector);
+        let part = Part { sweep: self.sweep, sector, sectors, ..Part::default() };
+        self.room.process(part, &self.piece, &mut self.output);
+    }
+
     /// What the last message holds.
     #[track_caller]
     pub(crate) fn closed(&self, sector: u32, closed: &mut Vec<Closed>) {
