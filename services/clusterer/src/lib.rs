@@ -1,7 +1,8 @@
 //! Sweep → Clusters: returns at most d apart are one obstacle (paper, Algorithm 1).
 //!
-//! Two methods give the same clusters to the byte: the scan window for sweeps in firing order, and a k-d tree for every
-//! input. All points are in the sensor frame [m].
+//! A sweep comes in one or more sectors; each cluster goes out as soon as no later one can reach it. Two methods give the
+//! same clusters to the byte: the scan window for sweeps in firing order, and a k-d tree for every input. All points are
+//! in the sensor frame [m].
 //!
 //! ```
 //! use clusterer::{Clusterer, Method, Params};
