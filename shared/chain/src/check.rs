@@ -328,6 +328,6 @@ mod tests {
         assert!(refused(r#""clusters-only""#, r#""nominal""#).contains(r#"overload.steps names "nominal""#));
         assert!(refused(r#""clusters-only""#, r#""fewer-starts""#).contains("after a later step"));
         assert!(refused("troubled_sweeps = 3", "troubled_sweeps = 11").contains("troubled_sweeps is 11, must be 1 to"));
-        assert!(refused("recover_sweeps = 50", "recover_sweeps = 0").contains("recover_sweeps is 0"));
+        assert!(refused("recover_sweeps = 10", "recover_sweeps = 0").contains("recover_sweeps is 0"));
     }
 }
