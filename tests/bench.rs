@@ -11,7 +11,17 @@ use std::process::Stdio;
 use serde_json::Value;
 use support::{encke, text};
 
-const STAGES: [&str; 7] = ["cluster", "normals", "histogram", "svm", "fit", "paper_chain", "full_chain"];
+const STAGES: [&str; 9] = [
+    "cluster",
+    "normals",
+    "histogram",
+    "svm",
+    "fit",
+    "paper_chain",
+    "full_chain",
+    "paper_last_sector",
+    "full_last_sector",
+];
 
 /// The lines of `encke bench --json` with three runs.
 fn bench(args: &[&str]) -> Vec<Value> {

@@ -11,26 +11,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde_json::Value;
-use support::{Finished, Run};
+use support::{Finished, LADDER, NO_LADDER, Run, chain_with};
 
 static MACHINE: Mutex<()> = Mutex::new(());
 
 fn whole_machine() -> MutexGuard<'static, ()> {
     MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// A copy of the shipped configuration with some lines of chain.toml changed.
-fn chain_with(changes: &[(&str, &str)]) -> (tempfile::TempDir, String) {
-    let dir = tempfile::tempdir().unwrap();
-    let mut text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/config/chain.toml")).unwrap();
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from:?} stands in chain.toml");
-        text = text.replace(from, to);
-    }
-    let path = dir.path().join("chain.toml");
-    std::fs::write(&path, text).unwrap();
-    let path = path.to_str().unwrap().to_owned();
-    (dir, path)
 }
 
 fn stop(run: &Run) {
@@ -98,10 +84,7 @@ fn a_stage_over_its_budget_takes_the_chain_down_the_ladder_and_back_step_by_step
 #[test]
 fn a_slow_stage_is_the_cause_of_its_misses_and_a_strict_run_fails_by_them() {
     let _machine = whole_machine();
-    let (_dir, chain) = chain_with(&[(
-        r#"steps = ["fewer-starts", "paper-features", "clusters-only", "every-second-sweep"]"#,
-        "steps = []",
-    )]);
+    let (_dir, chain) = chain_with(&[(LADDER, NO_LADDER)]);
     let run = Run::new(&["--sweeps", "40", "--strict", "--chain", &chain, "--from", "config/scenes/reference.toml"]);
     let child = run.start();
     run.wait_for_sweeps(1);
@@ -141,7 +124,7 @@ fn misses_beside_hogs_are_charged_to_those_who_took_the_cores_and_end_with_them(
         ("budget_ms = 10.0", "budget_ms = 4.0"),
         ("budget_ms = 60.0", "budget_ms = 4.0"),
         ("budget_ms = 20.0", "budget_ms = 4.0"),
-        (r#"steps = ["fewer-starts", "paper-features", "clusters-only", "every-second-sweep"]"#, "steps = []"),
+        (LADDER, NO_LADDER),
     ]);
     let run = Run::new(&["--duration", "forever", "--chain", &chain]);
     let child = run.start();

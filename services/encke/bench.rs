@@ -5,6 +5,7 @@ mod extraction;
 pub(crate) mod hop;
 mod judge;
 mod measure;
+mod sectors;
 mod stages;
 mod surface;
 
@@ -97,7 +98,7 @@ struct Line<'a> {
 
 /// A line of the table.
 fn row(line: &Line) -> String {
-    let times = format!("{:<12} {:>12.4} {:>12.4}", line.stage, line.median_ms, line.min_ms);
+    let times = format!("{:<17} {:>12.4} {:>12.4}", line.stage, line.median_ms, line.min_ms);
     let note = match (line.fits, line.evaluations) {
         (Some(fits), Some(evaluations)) => format!("  {fits} fits of {evaluations:.0} evaluations"),
         _ if line.stage == stages::FULL_CHAIN => format!("  {}", line.model),
@@ -110,7 +111,7 @@ fn heading(name: &str, bench: &Workbench, runs: u32) -> String {
     let svm = &bench.svm;
     format!(
         "sweep {name}: {} returns, {} clusters, {} with features; {}, {} support vectors; {runs} runs\n\
-         {:<12} {:>12} {:>12}\n",
+         {:<17} {:>12} {:>12}\n",
         bench.returns(),
         bench.found(),
         bench.described(),

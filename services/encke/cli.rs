@@ -86,11 +86,13 @@ const BENCH_NOTES: &str = "Stages, each on what those before it left:
   normals      nearest neighbours of every point, and normals; clusters with features only
   histogram    angles of all pairs and the joint histogram, on the neighbours and normals found
   svm          the classifier's `process` with its support vector machine, posterior included;
-               with --model: decision values and votes, cluster by cluster, no posterior
+               with --model: decision values and votes, several clusters at a time, no posterior
   fit          the extractor's whole `process` from the clusters, with solids and no histograms
   paper_chain  cluster, the extractor's whole `process` with histograms (normals, histogram,
                choice of columns) and no solids, svm
   full_chain   cluster, extractor and classifier as their files have them
+  paper_last_sector, full_last_sector
+               what both chains have still to do when the last of the chain's sectors has come
 
 The sweep is a recording's first complete one (its first where none is), or a scene's first.
 Reading it is not timed. All runs must give the same output to the byte, else the exit code is 1.

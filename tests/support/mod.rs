@@ -199,6 +199,24 @@ impl Finished {
     }
 }
 
+/// The line of chain.toml that has the ladder of overload, and one without steps.
+pub const LADDER: &str = r#"steps = ["fewer-starts", "paper-features", "clusters-only", "every-second-sweep"]"#;
+pub const NO_LADDER: &str = "steps = []";
+
+/// A copy of the shipped configuration with some lines of chain.toml changed.
+pub fn chain_with(changes: &[(&str, &str)]) -> (tempfile::TempDir, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/config/chain.toml")).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from:?} stands in chain.toml");
+        text = text.replace(from, to);
+    }
+    let path = dir.path().join("chain.toml");
+    std::fs::write(&path, text).unwrap();
+    let path = path.to_str().unwrap().to_owned();
+    (dir, path)
+}
+
 /// The sum of an object's numbers.
 pub fn sum(object: &Value) -> u64 {
     object.as_object().unwrap().values().map(|value| value.as_u64().unwrap()).sum()

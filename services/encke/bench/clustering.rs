@@ -43,14 +43,18 @@ impl Clustering {
     }
 
     pub(super) fn write(&self, hash: &mut dyn Hasher) {
-        hash.write(self.clusters.clusters.item_bytes());
-        hash.write(self.clusters.members.item_bytes());
-        hash.write(self.clusters.cells.item_bytes());
+        Self::write_clusters(&self.clusters, hash);
+    }
+
+    pub(super) fn write_clusters(clusters: &Clusters, hash: &mut dyn Hasher) {
+        hash.write(clusters.clusters.item_bytes());
+        hash.write(clusters.members.item_bytes());
+        hash.write(clusters.cells.item_bytes());
     }
 }
 
 /// The clusterer, with what the command line says of it.
-fn clusterer(args: &BenchArgs, plan: &Plan) -> Result<Clusterer, Failure> {
+pub(super) fn clusterer(args: &BenchArgs, plan: &Plan) -> Result<Clusterer, Failure> {
     let flags = [args.range.map(|_| "--range"), args.min_points.map(|_| "--min-points")];
     let given: Vec<_> = flags.into_iter().flatten().collect();
     if given.is_empty() {

@@ -11,6 +11,7 @@ use super::clustering::Clustering;
 use super::extraction::{Extraction, making};
 use super::judge::Judge;
 use super::measure::Once;
+use super::sectors::Sectors;
 use super::surface::Surface;
 use crate::assets::Assets;
 use crate::cli::BenchArgs;
@@ -19,6 +20,8 @@ use crate::{Failure, dispatch};
 /// One line of the bench. Works on what the workbench holds, and leaves there what it found there.
 pub(super) struct Timed {
     pub(super) name: &'static str,
+    /// Done before the clock starts.
+    prepare: fn(&mut Workbench) -> Result<(), Rejected>,
     work: fn(&mut Workbench) -> Result<(), Rejected>,
     /// Writes the work's output, for comparison.
     output: fn(&Workbench, &mut dyn Hasher),
@@ -26,17 +29,45 @@ pub(super) struct Timed {
 
 /// The stages, in the order of their lines.
 pub(super) const STAGES: &[Timed] = &[
-    Timed { name: "cluster", work: Workbench::cluster, output: Workbench::write_clusters },
-    Timed { name: "normals", work: Workbench::normals, output: Workbench::write_normals },
-    Timed { name: "histogram", work: Workbench::histogram, output: Workbench::write_histogram },
-    Timed { name: "svm", work: Workbench::svm, output: Workbench::write_svm },
-    Timed { name: FIT, work: Workbench::fit, output: Workbench::write_fits },
-    Timed { name: "paper_chain", work: Workbench::paper_chain, output: Workbench::write_svm },
-    Timed { name: FULL_CHAIN, work: Workbench::full_chain, output: Workbench::write_judgements },
+    Timed { name: "cluster", prepare: Workbench::nothing, work: Workbench::cluster, output: Workbench::write_clusters },
+    Timed { name: "normals", prepare: Workbench::nothing, work: Workbench::normals, output: Workbench::write_normals },
+    Timed {
+        name: "histogram",
+        prepare: Workbench::nothing,
+        work: Workbench::histogram,
+        output: Workbench::write_histogram,
+    },
+    Timed { name: "svm", prepare: Workbench::nothing, work: Workbench::svm, output: Workbench::write_svm },
+    Timed { name: FIT, prepare: Workbench::nothing, work: Workbench::fit, output: Workbench::write_fits },
+    Timed {
+        name: "paper_chain",
+        prepare: Workbench::nothing,
+        work: Workbench::paper_chain,
+        output: Workbench::write_svm,
+    },
+    Timed {
+        name: FULL_CHAIN,
+        prepare: Workbench::nothing,
+        work: Workbench::full_chain,
+        output: Workbench::write_judgements,
+    },
+    Timed {
+        name: "paper_last_sector",
+        prepare: Workbench::approach,
+        work: Workbench::paper_last_sector,
+        output: Workbench::write_last_sector,
+    },
+    Timed {
+        name: FULL_LAST_SECTOR,
+        prepare: Workbench::approach,
+        work: Workbench::full_last_sector,
+        output: Workbench::write_last_sector,
+    },
 ];
 
 const FIT: &str = "fit";
 pub(super) const FULL_CHAIN: &str = "full_chain";
+const FULL_LAST_SECTOR: &str = "full_last_sector";
 
 /// Every sweep is whole.
 pub(super) const PART: Part =
@@ -69,6 +100,7 @@ pub(super) struct Workbench {
     /// The chain's own.
     extraction: Extraction,
     judge: Judge,
+    sectors: Sectors,
 }
 
 impl Workbench {
@@ -87,11 +119,13 @@ impl Workbench {
             solids: Extraction::new(&making(plan, false, true)?)?,
             extraction: Extraction::new(plan)?,
             judge: Judge::configured(plan, assets)?,
+            sectors: Sectors::new(args, plan)?,
         })
     }
 
     /// Takes a sweep and runs the paper's stages on it once, so that each finds its input from then on.
     pub(super) fn load(&mut self, sweep: Box<Sweep>) -> Result<(), Failure> {
+        self.sectors.load(&sweep);
         self.sweep = sweep;
         self.paper_chain().map_err(Failure::run)?;
         self.surface.load(&self.clustering.clusters);
@@ -105,6 +139,7 @@ impl Workbench {
 
     /// One run of a stage.
     pub(super) fn run(&mut self, stage: &Timed) -> Result<Once, Rejected> {
+        (stage.prepare)(self)?;
         let started_ns = clock::now_ns();
         (stage.work)(self)?;
         let ns = clock::now_ns() - started_ns;
@@ -130,12 +165,16 @@ impl Workbench {
 
     /// The model that goes with a stage: the chain's own in the full chain, else the support vector machine.
     pub(super) fn judge_of(&self, stage: &Timed) -> &Judge {
-        if stage.name == FULL_CHAIN { &self.judge } else { &self.svm }
+        if [FULL_CHAIN, FULL_LAST_SECTOR].contains(&stage.name) { &self.judge } else { &self.svm }
     }
 
     /// Clusters with fitted solids and mean evaluations for one, where that is the stage's work.
     pub(super) fn fits_of(&self, stage: &Timed) -> Option<(usize, f64)> {
         (stage.name == FIT).then(|| self.solids.fits())
+    }
+
+    fn nothing(&mut self) -> Result<(), Rejected> {
+        Ok(())
     }
 
     fn cluster(&mut self) -> Result<(), Rejected> {
@@ -170,6 +209,26 @@ impl Workbench {
         self.cluster()?;
         self.extraction.process(&self.clustering.clusters)?;
         self.judge.process(&self.extraction.descriptors)
+    }
+
+    fn approach(&mut self) -> Result<(), Rejected> {
+        self.sectors.approach()
+    }
+
+    fn paper_last_sector(&mut self) -> Result<(), Rejected> {
+        self.sectors.process()?;
+        self.histograms.process(&self.sectors.clusters)?;
+        self.svm()
+    }
+
+    fn full_last_sector(&mut self) -> Result<(), Rejected> {
+        self.sectors.process()?;
+        self.extraction.process(&self.sectors.clusters)?;
+        self.judge.process(&self.extraction.descriptors)
+    }
+
+    fn write_last_sector(&self, hash: &mut dyn Hasher) {
+        self.sectors.write(hash);
     }
 
     fn write_clusters(&self, hash: &mut dyn Hasher) {
