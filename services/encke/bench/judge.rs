@@ -27,7 +27,7 @@ pub(super) struct Judge {
 
 enum By {
     Stage { classifier: Box<Classifier>, detections: Box<Detections> },
-    File { svm: Svm, decisions: Vec<Decision> },
+    File { svm: Box<Svm>, decisions: Vec<Decision> },
 }
 
 impl Judge {
@@ -53,7 +53,7 @@ impl Judge {
         let svm = Svm::new(&SvmFile::parse(&text).map_err(|cause| named(&cause))?);
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let decisions = Vec::with_capacity(MAX_CLUSTERS);
-        Ok(Self { name, support_vectors: svm.support_vectors(), by: By::File { svm, decisions } })
+        Ok(Self { name, support_vectors: svm.support_vectors(), by: By::File { svm: Box::new(svm), decisions } })
     }
 
     fn stage(plan: &Plan, assets: &Assets, choose: impl FnOnce(&mut classifier::Params)) -> Result<Self, Failure> {
