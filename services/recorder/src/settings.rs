@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use messages::MAX_HOPS;
 
 /// Most buffers that may stand between the chain and the writer.
-pub const MAX_QUEUE_PARTS: usize = 1024;
+pub const MAX_QUEUE_PARTS: usize = 2048;
 
 /// What the recorder writes and how it judges, as the caller has decided it.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,8 +140,8 @@ mod tests {
         assert!(sut().check().is_ok());
         assert!(Settings { queue_parts: MAX_QUEUE_PARTS, ..sut() }.check().is_ok());
         let error = |settings: Settings| settings.check().unwrap_err().to_string();
-        assert_eq!(error(Settings { queue_parts: 0, ..sut() }), "queue_parts is 0, must be 1 to 1024");
-        assert_eq!(error(Settings { queue_parts: 1025, ..sut() }), "queue_parts is 1025, must be 1 to 1024");
+        assert_eq!(error(Settings { queue_parts: 0, ..sut() }), "queue_parts is 0, must be 1 to 2048");
+        assert_eq!(error(Settings { queue_parts: 2049, ..sut() }), "queue_parts is 2049, must be 1 to 2048");
         assert_eq!(
             error(Settings { stages: vec![], ..sut() }),
             "the chain has 0 stages before the recorder, must be 1 to 8"
