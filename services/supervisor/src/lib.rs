@@ -5,6 +5,7 @@
 
 mod budget;
 mod child;
+mod closing;
 mod ending;
 mod error;
 mod house;

@@ -2,24 +2,24 @@ use std::time::Duration;
 
 use chain::SUPERVISOR;
 use crossbeam_channel::{Receiver, bounded, select, tick};
-use recorder::Snapshot;
-use runtime::page::{Page, State};
+use runtime::page::State;
 use runtime::realtime::{self, AsBefore};
 use runtime::{Pace, Plan, clock};
 use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use transport::{Instance, Node};
 
+use crate::SupervisorError;
 use crate::child::{Ended, Watched};
 use crate::house::House;
 use crate::machine::Machine;
 use crate::noise::Noise;
-use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS, Usage};
+use crate::overload::{Ladder, OverloadReport, Trouble};
+use crate::processes::Usage;
 use crate::progress::Progress;
-use crate::report::{Facts, Report};
+use crate::report::Report;
 use crate::services::Services;
 use crate::settle::settle;
-use crate::{SupervisorError, ledger};
 
 /// Between two looks at the pages.
 const LOOK: Duration = Duration::from_millis(5);
@@ -76,33 +76,33 @@ fn signals() -> Result<Receiver<i32>, SupervisorError> {
 
 /// A chain being watched.
 pub(crate) struct Watch<'a> {
-    instance: &'a Instance,
-    plan: &'a Plan,
-    spawn: bool,
+    pub(crate) instance: &'a Instance,
+    pub(crate) plan: &'a Plan,
+    pub(crate) spawn: bool,
     pub(crate) stages: Vec<Watched>,
     // Services before the node: they are its guests.
-    services: Services,
+    pub(crate) services: Services,
     pub(crate) node: Node,
-    signals: Receiver<i32>,
-    looks: Receiver<std::time::Instant>,
-    started_ns: u64,
-    next_sample_ns: u64,
-    usage: Usage,
-    machine: Machine,
-    noise: Noise,
+    pub(crate) signals: Receiver<i32>,
+    pub(crate) looks: Receiver<std::time::Instant>,
+    pub(crate) started_ns: u64,
+    pub(crate) next_sample_ns: u64,
+    pub(crate) usage: Usage,
+    pub(crate) machine: Machine,
+    pub(crate) noise: Noise,
     /// What the kernel refused, and the seat before it was asked.
-    refused: Vec<String>,
-    as_before: Option<AsBefore>,
-    progress: Progress,
-    ladder: Ladder,
-    overload: OverloadReport,
+    pub(crate) refused: Vec<String>,
+    pub(crate) as_before: Option<AsBefore>,
+    pub(crate) progress: Progress,
+    pub(crate) ladder: Ladder,
+    pub(crate) overload: OverloadReport,
     /// Every stage was up once.
-    begun: bool,
-    stop_asked: bool,
-    failed: Option<String>,
+    pub(crate) begun: bool,
+    pub(crate) stop_asked: bool,
+    pub(crate) failed: Option<String>,
     /// What the pages counted when they last changed, and when that was.
-    moved: u64,
-    moved_ns: u64,
+    pub(crate) moved: u64,
+    pub(crate) moved_ns: u64,
 }
 
 impl<'a> Watch<'a> {
@@ -326,66 +326,5 @@ impl<'a> Watch<'a> {
         source.step.set(self.ladder.step() as u64);
         tracing::warn!(sweep = step.sweep, from = step.from, to = step.to, reason = step.reason, "overload");
         self.overload.note(step);
-    }
-
-    pub(crate) fn sample(&mut self) {
-        let settled = clock::now_ns() - self.started_ns >= SETTLE_NS
-            && self.stages[0].page.published.get() >= SETTLE_SWEEPS * u64::from(self.plan.chain.sectors);
-        for stage in &mut self.stages {
-            if let Some(pid) = stage.pid() {
-                stage.usage.update(pid.as_raw_nonzero().get() as u32, settled);
-            }
-        }
-        self.usage.update(std::process::id(), settled);
-        let own_cpu_s = self.stages.iter().map(|stage| stage.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
-        self.machine.look(clock::now_ns(), own_cpu_s);
-    }
-
-    fn overload_report(&mut self) -> OverloadReport {
-        let mut report = std::mem::take(&mut self.overload);
-        for stage in &self.stages {
-            report.overruns.insert(stage.name.clone(), stage.page.overruns.get());
-            report.slips.insert(stage.name.clone(), stage.page.slips.get());
-        }
-        report
-    }
-
-    fn report(mut self) -> Report {
-        let overload = self.overload_report();
-        let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
-        self.usage.update(std::process::id(), true);
-        let pages: Vec<(&str, &Page)> = self.stages.iter().map(|stage| (stage.name.as_str(), &*stage.page)).collect();
-        let mut processes: Vec<_> =
-            self.stages.iter().map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
-        processes.push(ProcessReport::of_supervisor(&self.usage, duration_s));
-        Report::of(Facts {
-            plan: self.plan,
-            snapshot: self.snapshot(),
-            ledger: ledger::account(&pages, self.plan.chain.sectors),
-            published: self.stages[0].page.published.get(),
-            duration_s,
-            processes,
-            machine_load: self.machine.load(),
-            noise_ms: self.noise.finish(),
-            realtime_refused: std::mem::take(&mut self.refused),
-            stopped: self.failed.clone(),
-        })
-    }
-
-    /// The sink's statistics of all its lives.
-    fn snapshot(&self) -> Snapshot {
-        let mut all = Snapshot::default();
-        let lives = self.stages.last().map_or(0, |sink| sink.page.incarnation.get());
-        for life in 1..=lives {
-            let path = Plan::snapshot_path(self.instance, life as u32);
-            // A life that ended before its first checkpoint left none.
-            if !path.exists() {
-                continue;
-            }
-            if let Err(error) = Snapshot::read(&path).and_then(|snapshot| all.merge(&snapshot)) {
-                tracing::error!(%error, "statistics of one life of the sink are missing");
-            }
-        }
-        all
     }
 }

@@ -1,0 +1,76 @@
+//! What a chain has used and done, gathered while it runs and told at its end.
+
+use recorder::Snapshot;
+use runtime::page::Page;
+use runtime::{Plan, clock};
+
+use crate::ledger;
+use crate::overload::OverloadReport;
+use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS};
+use crate::report::{Facts, Report};
+use crate::watch::Watch;
+
+impl Watch<'_> {
+    /// Looks at what each process uses, and who has the cores.
+    pub(crate) fn sample(&mut self) {
+        let settled = clock::now_ns() - self.started_ns >= SETTLE_NS
+            && self.stages[0].page.published.get() >= SETTLE_SWEEPS * u64::from(self.plan.chain.sectors);
+        for stage in &mut self.stages {
+            if let Some(pid) = stage.pid() {
+                stage.usage.update(pid.as_raw_nonzero().get() as u32, settled);
+            }
+        }
+        self.usage.update(std::process::id(), settled);
+        let own_cpu_s = self.stages.iter().map(|stage| stage.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
+        self.machine.look(clock::now_ns(), own_cpu_s);
+    }
+
+    fn overload_report(&mut self) -> OverloadReport {
+        let mut report = std::mem::take(&mut self.overload);
+        for stage in &self.stages {
+            report.overruns.insert(stage.name.clone(), stage.page.overruns.get());
+            report.slips.insert(stage.name.clone(), stage.page.slips.get());
+        }
+        report
+    }
+
+    pub(crate) fn report(mut self) -> Report {
+        let overload = self.overload_report();
+        let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
+        self.usage.update(std::process::id(), true);
+        let pages: Vec<(&str, &Page)> = self.stages.iter().map(|stage| (stage.name.as_str(), &*stage.page)).collect();
+        let mut processes: Vec<_> =
+            self.stages.iter().map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
+        processes.push(ProcessReport::of_supervisor(&self.usage, duration_s));
+        Report::of(Facts {
+            plan: self.plan,
+            snapshot: self.snapshot(),
+            ledger: ledger::account(&pages, self.plan.chain.sectors),
+            published: self.stages[0].page.published.get(),
+            duration_s,
+            processes,
+            overload,
+            machine_load: self.machine.load(),
+            noise_ms: self.noise.finish(),
+            realtime_refused: std::mem::take(&mut self.refused),
+            stopped: self.failed.clone(),
+        })
+    }
+
+    /// The sink's statistics of all its lives.
+    fn snapshot(&self) -> Snapshot {
+        let mut all = Snapshot::default();
+        let lives = self.stages.last().map_or(0, |sink| sink.page.incarnation.get());
+        for life in 1..=lives {
+            let path = Plan::snapshot_path(self.instance, life as u32);
+            // A life that ended before its first checkpoint left none.
+            if !path.exists() {
+                continue;
+            }
+            if let Err(error) = Snapshot::read(&path).and_then(|snapshot| all.merge(&snapshot)) {
+                tracing::error!(%error, "statistics of one life of the sink are missing");
+            }
+        }
+        all
+    }
+}
