@@ -206,7 +206,9 @@ impl TraceEvents {
 
     fn work(&mut self, position: usize, part: Part, hop: &Hop, taken_ns: u64, bytes: &mut Vec<u8>) -> Place {
         let work_ns = &mut self.threads[position].work_ns;
-        let place = Place::after(work_ns, hop.started_ns, hop.finished_ns);
+        // The source takes a part in hand, makes it, and waits for its time.
+        let start_ns = if position == 0 { hop.received_ns } else { hop.started_ns };
+        let place = Place::after(work_ns, start_ns, hop.finished_ns);
         let (Part { sweep, sector, .. }, pid) = (part, pid(position));
         let name = if position == 0 { "make" } else { "process" };
         let (verdict, step, taken) = (hop.verdict.name(), part.step().name(), millis(taken_ns));

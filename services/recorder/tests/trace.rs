@@ -160,7 +160,8 @@ impl Chain {
         let part = Part { ordinal, sweep, sector, sectors: self.sectors, step: self.step, ..Part::default() };
         let mut trace = Trace { part, due_ns, sweep_start_ns, ..Trace::default() };
         let mut sent_ns = due_ns + 10_001;
-        trace.push(Hop { started_ns: due_ns - 100 * MS / sectors, finished_ns: sent_ns, ..Hop::default() });
+        let received_ns = due_ns - 100 * MS / sectors;
+        trace.push(Hop { received_ns, started_ns: received_ns, finished_ns: sent_ns, ..Hop::default() });
         for stage in 1..4_u16 {
             let free_ns = self.free_ns[usize::from(stage)];
             let received_ns = sent_ns.max(free_ns) + 20_011;
