@@ -65,7 +65,8 @@ fn a_slow_stage_loses_nothing_at_fast_pace_and_changes_no_byte() {
 
 #[test]
 fn a_stopped_stage_is_charged_with_every_sweep_that_it_held_up() {
-    let run = Run::new(&["--duration", "forever"]);
+    // One obstacle, so that no other stage has much to catch up with.
+    let run = Run::new(&["--duration", "forever", "--from", "config/scenes/single.toml"]);
     let child = run.start();
     run.wait_for_sweeps(10);
     run.inject(&["stop", "clusterer", "--for", "600ms"]);
