@@ -6,54 +6,23 @@ mod common;
 
 use common::scanner::Scanner;
 use common::twins::assert_cells;
-use common::{assert_exact, empty_turn, put};
+use common::{any, assert_exact, empty_turn, put};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
-fn config(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
-}
-
-prop_compose! {
-    fn scanner()(
-        rings in 1_usize..24,
-        columns in 1_usize..120,
-        positive in any::<bool>(),
-        start_rad in -3.2..3.2,
-        turns in prop_oneof![Just(1.0), 0.05..1.6],
-        (turning, uneven) in any::<(bool, bool)>(),
-        jitter in prop_oneof![Just(0.0), 0.0..3.0],
-        missing in prop_oneof![Just(0.0), 0.0..1.0],
-        dropout in 0.0..0.9,
-        dust in prop_oneof![Just(0.0), 0.0..0.2],
-        sideways_rad in prop_oneof![Just(0.0), 0.0..0.6],
-        walls in any::<bool>(),
-        (dust_m, obstacles, seed) in (0.1..5.0, 0_usize..30, any::<u64>()),
-    ) -> Scanner {
-        Scanner {
-            rings,
-            columns,
-            sense: if positive { 1.0 } else { -1.0 },
-            start_rad,
-            turns,
-            turning,
-            jitter,
-            missing,
-            dropout,
-            dust,
-            dust_m,
-            noise_m: 0.02,
-            uneven,
-            sideways_rad,
-            walls_m: walls.then_some([5.0, 8.0, 3.0]),
-            obstacles,
-            seed,
-        }
-    }
+/// Any scanner at all.
+fn scanner() -> impl Strategy<Value = Scanner> {
+    any::scanner(any::Bounds {
+        columns: 1..120,
+        most_turns: 1.6,
+        most_jitter: 3.0,
+        most_missing: 1.0,
+        most_sideways_rad: 0.6,
+        most_obstacles: 30,
+    })
 }
 
 proptest! {
-    #![proptest_config(config(400))]
+    #![proptest_config(any::config(400))]
 
     // verifies CLU-001, CLU-002, CLU-007
     #[test]

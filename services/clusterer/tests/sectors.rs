@@ -10,10 +10,9 @@ use clusterer::Method;
 use clusterer::validation::brute_force_roots;
 use common::scanner::Scanner;
 use common::sectors::{Sender, assert_same_in_sectors};
-use common::{empty_turn, put, room};
+use common::{any, empty_turn, put, room};
 use messages::{Cutter, Refusal, Sweep, Verdict};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -259,50 +258,20 @@ fn the_seam_flag_is_that_of_the_whole_sweep_for_every_window_and_column() {
     }
 }
 
-fn config(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
-}
-
-prop_compose! {
-    fn scanner()(
-        rings in 1_usize..24,
-        columns in 20_usize..300,
-        positive in any::<bool>(),
-        start_rad in -3.2..3.2,
-        turns in prop_oneof![Just(1.0), 0.05..1.0],
-        (turning, uneven) in any::<(bool, bool)>(),
-        jitter in prop_oneof![Just(0.0), 0.0..0.45],
-        missing in prop_oneof![Just(0.0), 0.0..0.9],
-        dropout in 0.0..0.9,
-        dust in prop_oneof![Just(0.0), 0.0..0.2],
-        sideways_rad in prop_oneof![Just(0.0), 0.0..0.09],
-        walls in any::<bool>(),
-        (dust_m, obstacles, seed) in (0.1..5.0, 0_usize..40, any::<u64>()),
-    ) -> Scanner {
-        Scanner {
-            rings,
-            columns,
-            sense: if positive { 1.0 } else { -1.0 },
-            start_rad,
-            turns,
-            turning,
-            jitter,
-            missing,
-            dropout,
-            dust,
-            dust_m,
-            noise_m: 0.02,
-            uneven,
-            sideways_rad,
-            walls_m: walls.then_some([5.0, 8.0, 3.0]),
-            obstacles,
-            seed,
-        }
-    }
+/// Scanners whose sweeps may be cut, but for those that turn out otherwise.
+fn scanner() -> impl Strategy<Value = Scanner> {
+    any::scanner(any::Bounds {
+        columns: 20..300,
+        most_turns: 1.0,
+        most_jitter: 0.45,
+        most_missing: 0.9,
+        most_sideways_rad: 0.09,
+        most_obstacles: 40,
+    })
 }
 
 proptest! {
-    #![proptest_config(config(300))]
+    #![proptest_config(any::config(300))]
 
     // verifies CLU-001, CLU-013
     #[test]

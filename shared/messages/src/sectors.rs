@@ -143,14 +143,14 @@ fn goes_round_once(columns: &[Column]) -> bool {
         if step != 0.0 && sense == 0.0 {
             sense = step.signum();
         }
-        // Not finite fails.
-        if !(step * sense >= 0.0 && step.abs() < FRAC_PI_2) {
+        // Not finite fails; far out, single precision no longer knows the angle.
+        if !(step * sense >= 0.0 && step.abs() < FRAC_PI_2 && azimuth.abs() <= TAU) {
             return false;
         }
         turned += step.abs();
         before = azimuth;
     }
-    turned < TAU && before.is_finite()
+    turned < TAU && before.abs() <= TAU
 }
 
 #[cfg(test)]
@@ -228,7 +228,8 @@ mod tests {
     #[test]
     fn a_sweep_that_makes_no_promise_travels_in_its_last_sector() {
         type Spoil = fn(&mut Sweep);
-        let spoils: [(&str, Spoil); 8] = [
+        let spoils: [(&str, Spoil); 9] = [
+            ("an azimuth many turns out", |sweep| sweep.columns[50].azimuth_rad += 1e4 * TAU as f32),
             ("unorganised", |sweep| sweep.header.organised = 0),
             ("two returns of a firing", |sweep| sweep.returns[1].ring = sweep.returns[0].ring),
             ("columns out of order", |sweep| sweep.returns.swap(0, 50)),

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+pub(crate) mod any;
 pub(crate) mod scanner;
 pub(crate) mod sectors;
 pub(crate) mod twins;
