@@ -1,6 +1,8 @@
 use nalgebra::Vector3;
+use pulp::Simd;
 
 use super::silhouette::{Passing, Upright, ellipse};
+use super::wide::{WideVector, along, minus};
 use super::{Meeting, UnitSolid};
 
 /// The cone √(x² + y²) ≤ (1 − z)/2, |z| ≤ 1: apex at z = 1, base of radius 1 at z = −1.
@@ -10,84 +12,90 @@ impl UnitSolid for Cone {
     const ROUND: bool = true;
 
     #[inline(always)]
-    fn meet(origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting> {
+    fn meet<S: Simd>(origin: WideVector<S>, direction: WideVector<S>) -> Meeting<S> {
+        let all = |value| origin[0].all(value);
+        let [zero, one] = [all(0.0), all(1.0)];
+        let ([ox, oy, oz], [dx, dy, dz]) = (origin, direction);
         // The side's radius at the ray's height is w + t v: x² + y² = (w + t v)², a t² + 2 b t + c = 0.
-        let (w, v) = (0.5 * (1.0 - origin.z), -0.5 * direction.z);
-        let a = direction.x * direction.x + direction.y * direction.y - v * v;
-        let b = origin.x * direction.x + origin.y * direction.y - w * v;
-        let c = origin.x * origin.x + origin.y * origin.y - w * w;
+        let (w, v) = (all(0.5) * (one - oz), all(-0.5) * dz);
+        let a = dx * dx + dy * dy - v * v;
+        let b = ox * dx + oy * dy - w * v;
+        let c = ox * ox + oy * oy - w * w;
 
-        let mut first: Option<Meeting> = None;
         let discriminant = b * b - a * c;
-        if discriminant >= 0.0 {
-            let q = -(b + discriminant.sqrt().copysign(b));
-            let (one, other) = (q / a, c / q);
-            let (near, far) = if one < other { (one, other) } else { (other, one) };
-            // The equation has a second cone above the apex: a root may lie on that one, and the other count.
-            for distance in [near, far] {
-                let z = origin.z + direction.z * distance;
-                if distance > 0.0 && z.abs() <= 1.0 {
-                    let point = origin + direction * distance;
-                    first = Some(Meeting { distance, normal: Vector3::new(point.x, point.y, 0.25 * (1.0 - point.z)) });
-                    break;
-                }
-            }
+        let q = -(b + discriminant.sqrt().copysign(b));
+        let (first, second) = (q / a, c / q);
+        let swap = first.less(second);
+        let (near, far) = (swap.choose(first, second), swap.choose(second, first));
+        // The equation has a second cone above the apex: a root may lie on that one, and the other count.
+        let crosses = discriminant.at_least(zero);
+        let by_near = crosses & near.greater(zero) & (oz + dz * near).abs().at_most(one);
+        let by_far = crosses & far.greater(zero) & (oz + dz * far).abs().at_most(one);
+        let side = by_near.choose(near, far);
+        let by_side = by_near | by_far;
+        let [x, y, z] = along(origin, direction, side);
+        let normal = [x, y, all(0.25) * (one - z)];
+
+        let base = (all(-1.0) - oz) / dz; // infinite or NaN for a ray along the base
+        let (x, y) = (ox + dx * base, oy + dy * base);
+        let by_base = base.greater(zero) & (x * x + y * y).at_most(one) & (!by_side | base.less(side));
+        Meeting {
+            found: by_side | by_base,
+            distance: by_base.choose(base, side),
+            normal: by_base.choose_vector([-zero, -zero, -one], normal),
         }
-        let distance = (-1.0 - origin.z) / direction.z; // infinite or NaN for a ray along the base
-        let (x, y) = (origin.x + direction.x * distance, origin.y + direction.y * distance);
-        if distance > 0.0 && x * x + y * y <= 1.0 && first.is_none_or(|side| distance < side.distance) {
-            first = Some(Meeting { distance, normal: -Vector3::z() });
-        }
-        first
     }
 
     /// The outline is the ellipse of the base and two lines that touch it and meet at the apex, where that lies outside
     /// the ellipse. Heights are counted from the base's middle.
-    fn pass(half_m: &Vector3<f64>, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Passing {
-        let (radius_m, half_height_m) = (half_m.x, half_m.z);
+    #[inline(always)]
+    fn pass<S: Simd>(half_m: WideVector<S>, origin: WideVector<S>, direction: WideVector<S>) -> Passing<S> {
+        let all = |value| origin[0].all(value);
+        let [zero, one] = [all(0.0), all(1.0)];
+        let (radius_m, half_height_m) = (half_m[0], half_m[2]);
         let view = Upright::new(origin, direction);
-        let (apex, depth_m) = (2.0 * half_height_m * view.height, radius_m * view.depth);
-        let (x, y) = (view.x, view.y + 0.5 * apex);
-        let on_base = |normal: &Vector3<f64>| Upright::on_rim(normal, radius_m, -half_height_m);
+        let (apex, depth_m) = (all(2.0) * half_height_m * view.height, radius_m * view.depth);
+        let (x, y) = (view.x, view.y + all(0.5) * apex);
 
         let (arc, [arc_x, arc_y]) = ellipse(x, y, radius_m, depth_m);
-        let arc_normal = view.lift(arc_x, arc_y);
-        let by_arc = Passing { distance_m: arc, normal: arc_normal, point_m: on_base(&arc_normal) };
-        if apex <= depth_m {
-            return by_arc;
-        }
         // Where the line from the apex touches the ellipse.
         let share = depth_m / apex;
-        let (touch_x, touch_y) = (radius_m * (1.0 - share * share).sqrt(), depth_m * share);
+        let (touch_x, touch_y) = (radius_m * (one - share * share).sqrt(), depth_m * share);
         let (run, rise) = (-touch_x, apex - touch_y);
         let length = (run * run + rise * rise).sqrt();
         let (line_x, line_y) = (rise / length, -run / length);
-        let along = ((x - touch_x) * run + (y - touch_y) * rise) / length;
+        let along_m = ((x - touch_x) * run + (y - touch_y) * rise) / length;
         let line = (x - touch_x) * line_x + (y - touch_y) * line_y;
-        if along < 0.0 && arc > line {
-            return by_arc;
-        }
+        let by_arc = apex.at_most(depth_m) | (along_m.less(zero) & arc.greater(line));
+
         let (off_x, off_y) = (x, y - apex);
-        if along > length && line > 0.0 {
-            let distance_m = (off_x * off_x + off_y * off_y).sqrt();
-            if distance_m > 1e-9 {
-                let normal = view.lift(off_x / distance_m, off_y / distance_m);
-                return Passing { distance_m, normal, point_m: Vector3::new(0.0, 0.0, half_height_m) };
-            }
-        }
+        let off_m = (off_x * off_x + off_y * off_y).sqrt();
+        let by_tip = !by_arc & along_m.greater(length) & line.greater(zero) & off_m.greater(all(1e-9));
+
         // Within, the base may be nearer than the side: to first order, from the arc below the ray.
-        let below = depth_m * (1.0 - (x / radius_m).powi(2)).max(0.0).sqrt();
+        let across = x / radius_m;
+        let below = depth_m * (one - across * across).max(zero).sqrt();
         let (out_x, out_y) = (x / (radius_m * radius_m), -below / (depth_m * depth_m));
         let steepness = (out_x * out_x + out_y * out_y).sqrt();
         let base = (y + below) * out_y / steepness;
-        if line < 0.0 && base > line {
-            let normal = view.lift(out_x / steepness, out_y / steepness);
-            return Passing { distance_m: base, normal, point_m: on_base(&normal) };
+        let by_base = !by_arc & !by_tip & line.less(zero) & base.greater(line);
+
+        let pick = |on_arc, on_tip, on_base, on_line| {
+            by_arc.choose(on_arc, by_tip.choose(on_tip, by_base.choose(on_base, on_line)))
+        };
+        let normal = view.lift(
+            pick(arc_x, off_x / off_m, out_x / steepness, line_x),
+            pick(arc_y, off_y / off_m, out_y / steepness, line_y),
+        );
+        let foot = Upright::on_rim(normal, radius_m, -half_height_m);
+        let tip = [zero, zero, half_height_m];
+        let up = (along_m / length).clamp(zero, one);
+        let on_line = along(foot, minus(tip, foot), up);
+        Passing {
+            distance_m: pick(arc, off_m, base, line),
+            normal,
+            point_m: (by_arc | by_base).choose_vector(foot, by_tip.choose_vector(tip, on_line)),
         }
-        let normal = view.lift(line_x, line_y);
-        let foot = on_base(&normal);
-        let tip = Vector3::new(0.0, 0.0, half_height_m);
-        Passing { distance_m: line, normal, point_m: foot + (tip - foot) * (along / length).clamp(0.0, 1.0) }
     }
 
     fn bounding_radius(half_m: &Vector3<f64>) -> f64 {

@@ -1,6 +1,8 @@
 use nalgebra::Vector3;
+use pulp::Simd;
 
 use super::silhouette::{Passing, Upright, ellipse};
+use super::wide::{WideVector, along};
 use super::{Meeting, UnitSolid};
 
 /// The cylinder x² + y² ≤ 1, |z| ≤ 1.
@@ -11,66 +13,63 @@ impl UnitSolid for Cylinder {
 
     /// A ray is inside while it is inside the endless cylinder and between the planes of the caps.
     #[inline(always)]
-    fn meet(origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting> {
-        let inverse = 1.0 / direction.z;
-        let (one, other) = ((-1.0 - origin.z) * inverse, (1.0 - origin.z) * inverse);
-        let (low, high) = if one < other { (one, other) } else { (other, one) };
+    fn meet<S: Simd>(origin: WideVector<S>, direction: WideVector<S>) -> Meeting<S> {
+        let all = |value| origin[0].all(value);
+        let ([ox, oy, oz], [dx, dy, dz]) = (origin, direction);
+        let inverse = all(1.0) / dz;
+        let (one, other) = ((all(-1.0) - oz) * inverse, (all(1.0) - oz) * inverse);
+        let swap = one.less(other);
+        let (low, high) = (swap.choose(one, other), swap.choose(other, one));
 
         // x² + y² = 1: a t² + 2 b t + c = 0.
-        let a = direction.x * direction.x + direction.y * direction.y;
-        let b = origin.x * direction.x + origin.y * direction.y;
-        let c = origin.x * origin.x + origin.y * origin.y - 1.0;
+        let a = dx * dx + dy * dy;
+        let b = ox * dx + oy * dy;
+        let c = ox * ox + oy * oy - all(1.0);
         let discriminant = b * b - a * c;
-        if discriminant < 0.0 {
-            return None;
-        }
-        let (near, far) = if a > 1e-18 {
-            let root = discriminant.sqrt();
-            ((-b - root) / a, (-b + root) / a)
-        } else if c <= 0.0 {
-            (f64::NEG_INFINITY, f64::INFINITY) // along the axis, inside
-        } else {
-            return None; // along the axis, beside
-        };
+        let root = discriminant.sqrt();
+        // Along the axis it is inside always or never.
+        let leans = a.greater(all(1e-18));
+        let near = leans.choose((-b - root) / a, all(f64::NEG_INFINITY));
+        let far = leans.choose((-b + root) / a, all(f64::INFINITY));
+        let crosses = !discriminant.less(all(0.0)) & (leans | c.at_most(all(0.0)));
+
         let distance = near.max(low);
         // Written so that NaN fails.
-        if !(distance > 0.0 && distance <= far.min(high)) {
-            return None;
-        }
-        let normal = if low > near {
-            Vector3::new(0.0, 0.0, -direction.z.signum())
-        } else {
-            let point = origin + direction * distance;
-            Vector3::new(point.x, point.y, 0.0)
-        };
-        Some(Meeting { distance, normal })
+        let found = crosses & distance.greater(all(0.0)) & distance.at_most(far.min(high));
+        let zero = all(0.0);
+        let [x, y, _] = along(origin, direction, distance);
+        let cap = [zero, zero, -all(1.0).copysign(dz)];
+        Meeting { found, distance, normal: low.greater(near).choose_vector(cap, [x, y, zero]) }
     }
 
     /// The outline is two upright lines between two ellipses, those of the caps.
-    fn pass(half_m: &Vector3<f64>, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Passing {
-        let (radius_m, half_height_m) = (half_m.x, half_m.z);
+    #[inline(always)]
+    fn pass<S: Simd>(half_m: WideVector<S>, origin: WideVector<S>, direction: WideVector<S>) -> Passing<S> {
+        let all = |value| origin[0].all(value);
+        let [zero, one] = [all(0.0), all(1.0)];
+        let (radius_m, half_height_m) = (half_m[0], half_m[2]);
         let view = Upright::new(origin, direction);
         let (top, depth_m) = (half_height_m * view.height, radius_m * view.depth);
-        let end = 1.0_f64.copysign(view.y);
+        let end = one.copysign(view.y);
         let above = view.y.abs() - top;
-        if above <= 0.0 {
-            let side = view.x - radius_m;
-            let cap = above - depth_m * (1.0 - (view.x / radius_m).powi(2)).max(0.0).sqrt();
-            if side >= cap {
-                let normal = view.lift(1.0, 0.0);
-                let z_m = if view.height > 1e-9 { view.y / view.height } else { 0.0 };
-                return Passing { distance_m: side, normal, point_m: Upright::on_rim(&normal, radius_m, z_m) };
-            }
-            let normal = view.lift(0.0, end);
-            return Passing {
-                distance_m: cap,
-                normal,
-                point_m: Upright::on_rim(&normal, radius_m, half_height_m * end),
-            };
+
+        // Beyond an end: its ellipse. Between them: a line, or an ellipse from within.
+        let between = above.at_most(zero);
+        let side = view.x - radius_m;
+        let share = view.x / radius_m;
+        let cap = above - depth_m * (one - share * share).max(zero).sqrt();
+        let by_side = between & side.at_least(cap);
+        let (arc, [arc_x, arc_y]) = ellipse(view.x, above, radius_m, depth_m);
+
+        let x = by_side.choose(one, between.choose(zero, arc_x));
+        let y = by_side.choose(zero, between.choose(end, arc_y * end));
+        let normal = view.lift(x, y);
+        let z_m = view.height.greater(all(1e-9)).choose(view.y / view.height, zero);
+        Passing {
+            distance_m: by_side.choose(side, between.choose(cap, arc)),
+            normal,
+            point_m: Upright::on_rim(normal, radius_m, by_side.choose(z_m, half_height_m * end)),
         }
-        let (distance_m, [x, y]) = ellipse(view.x, above, radius_m, depth_m);
-        let normal = view.lift(x, y * end);
-        Passing { distance_m, normal, point_m: Upright::on_rim(&normal, radius_m, half_height_m * end) }
     }
 
     fn bounding_radius(half_m: &Vector3<f64>) -> f64 {

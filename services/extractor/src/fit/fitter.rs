@@ -1,11 +1,12 @@
 use messages::Fit;
 use nalgebra::{Matrix3, Vector3};
+use pulp::Arch;
 
 use super::budget::Purse;
 use super::descent::Descent;
 use super::frames::{FRAMES, Frames, TURNED, turned};
 use super::outcome::solid_fit;
-use super::rays::thin;
+use super::rays::{Beam, thin};
 use super::residuals::{Measure, Rays};
 use super::start::Cloud;
 use super::{Beliefs, Body, Bundle, FitSettings, Kind, Ray};
@@ -44,6 +45,8 @@ const MOST_STARTS: usize = FRAMES + TURNED + 2 + 9 * FRAMES;
 #[derive(Debug)]
 pub struct Fitter {
     settings: FitSettings,
+    /// The instructions of this machine.
+    arch: Arch,
     frames: Frames,
     few: Picked,
     full: Picked,
@@ -57,20 +60,30 @@ struct Picked {
     most: usize,
     hits: Vec<Ray>,
     misses: Vec<Ray>,
+    /// The same side by side.
+    beams: [Beam; 2],
 }
 
 impl Picked {
     fn new(most: usize) -> Self {
-        Self { most, hits: Vec::with_capacity(most), misses: Vec::with_capacity(most) }
+        Self {
+            most,
+            hits: Vec::with_capacity(most),
+            misses: Vec::with_capacity(most),
+            beams: [Beam::new(most), Beam::new(most)],
+        }
     }
 
     fn pick(&mut self, bundle: &Bundle) {
         thin(&bundle.hits, self.most, &mut self.hits);
         thin(&bundle.misses, self.most, &mut self.misses);
+        self.beams[0].take(&self.hits);
+        self.beams[1].take(&self.misses);
     }
 
-    fn rays<'a>(&'a self, sigma_m: f64, beliefs: &'a Beliefs) -> Rays<'a> {
-        Rays { hits: &self.hits, misses: &self.misses, sigma_m, beliefs }
+    fn rays<'a>(&'a self, arch: Arch, sigma_m: f64, beliefs: &'a Beliefs) -> Rays<'a> {
+        let [hits, misses] = &self.beams;
+        Rays { arch, hits, misses, sigma_m, beliefs }
     }
 }
 
@@ -79,6 +92,7 @@ impl Fitter {
     pub fn new(settings: FitSettings) -> Self {
         Self {
             settings,
+            arch: Arch::new(),
             frames: Frames::new(),
             few: Picked::new(settings.scouting_rays),
             full: Picked::new(settings.rays),
@@ -136,7 +150,7 @@ impl Fitter {
 
     /// Leaves the best starts of each solid in `descents`.
     fn scout(&mut self, frames: &[Matrix3<f64>; FRAMES], sigma_m: f64, purse: &mut Purse) {
-        let rays = self.few.rays(sigma_m.max(SCOUTING_SIGMA_M), &self.settings.beliefs);
+        let rays = self.few.rays(self.arch, sigma_m.max(SCOUTING_SIGMA_M), &self.settings.beliefs);
         let cloud = Cloud::new(&self.full.hits);
         let axes = &self.axes;
         let starts = FRAMES + TURNED + 2 + 3 * axes.len();
@@ -156,7 +170,7 @@ impl Fitter {
 
     /// Takes the survivors down the likelihood, and sorts them by cost.
     fn polish(&mut self, sigma_m: f64, purse: &mut Purse) {
-        let rays = self.full.rays(sigma_m, &self.settings.beliefs);
+        let rays = self.full.rays(self.arch, sigma_m, &self.settings.beliefs);
         let descents = &mut self.descents;
         for descent in descents.iter_mut() {
             *descent = Descent::at(descent.kind, descent.body, &rays, Measure::Range, purse);

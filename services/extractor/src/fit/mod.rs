@@ -17,12 +17,14 @@ mod outcome;
 mod rays;
 mod residuals;
 mod settings;
+mod sight;
 mod silhouette;
 mod solid;
 mod start;
 mod system;
 #[cfg(test)]
 mod tests;
+mod wide;
 
 pub use fitter::Fitter;
 pub use rays::Bundle;

@@ -1,6 +1,9 @@
 use lidar::{MAX_COLUMNS, Return};
 use messages::{Cell, CellKind, Cluster, Clusters};
 use nalgebra::Vector3;
+use pulp::Simd;
+
+use super::wide::{Wide, WideVector};
 
 /// A ray from the sensor: a hit at `range_m`, or free up to there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +18,48 @@ impl Ray {
     /// Where it ends [m], sensor frame.
     pub(crate) fn end_m(&self) -> Vector3<f64> {
         self.direction * self.range_m
+    }
+}
+
+/// Rays side by side, to be worked on many at once.
+#[derive(Debug)]
+pub(crate) struct Beam {
+    count: usize,
+    /// x, y, z of the directions, then ranges [m]; filled up with the last ray to a multiple of [`MOST_LANES`].
+    columns: [Vec<f64>; 4],
+}
+
+/// Most rays that any machine works on at once.
+pub(crate) const MOST_LANES: usize = 8;
+
+impl Beam {
+    /// Room for `most` rays.
+    pub(crate) fn new(most: usize) -> Self {
+        Self { count: 0, columns: std::array::from_fn(|_| Vec::with_capacity(most.next_multiple_of(MOST_LANES))) }
+    }
+
+    /// Takes these rays in their order.
+    pub(crate) fn take(&mut self, rays: &[Ray]) {
+        self.count = rays.len();
+        let fill = rays.len().next_multiple_of(MOST_LANES) - rays.len();
+        let all = || rays.iter().chain(rays.last().into_iter().cycle().take(fill));
+        for (axis, column) in self.columns.iter_mut().enumerate() {
+            column.clear();
+            column.extend(all().map(|ray| ray.direction.get(axis).copied().unwrap_or(ray.range_m)));
+        }
+    }
+
+    /// Rays taken, without those that fill up.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Directions and ranges of the `place`th group of rays.
+    #[inline(always)]
+    pub(crate) fn group<S: Simd>(&self, simd: S, place: usize) -> (WideVector<S>, Wide<S>) {
+        let [x, y, z, range_m] = &self.columns;
+        let direction = [Wide::load(simd, x, place), Wide::load(simd, y, place), Wide::load(simd, z, place)];
+        (direction, Wide::load(simd, range_m, place))
     }
 }
 

@@ -1,6 +1,8 @@
 use nalgebra::{Matrix3, Vector3};
+use pulp::Simd;
 
 use super::silhouette::Passing;
+use super::wide::{Which, Wide, WideVector};
 
 /// The four solids of the paper (Sec. III-A), in the order of [`lidar::ObstacleClass::SOLIDS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,13 +27,15 @@ impl Kind {
     }
 }
 
-/// Where a ray meets a surface first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Meeting {
+/// Where rays meet a surface first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Meeting<S: Simd> {
+    /// The rays that meet it; of the others what follows says nothing.
+    pub(crate) found: Which<S>,
     /// Multiple of the ray's direction.
-    pub(crate) distance: f64,
+    pub(crate) distance: Wide<S>,
     /// Outward normal there, of any length.
-    pub(crate) normal: Vector3<f64>,
+    pub(crate) normal: WideVector<S>,
 }
 
 /// A convex solid scaled to unit half extents. A body of half extents (a, b, c) is this one with its axes stretched by
@@ -41,11 +45,11 @@ pub(crate) trait UnitSolid {
     /// Whether it looks the same turned about z: then a = b, and that turn is no parameter.
     const ROUND: bool;
 
-    /// The nearest point of the surface ahead of a ray whose origin lies outside; none where it passes the solid by.
-    fn meet(origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting>;
+    /// The nearest point of the surface ahead of rays whose origin lies outside.
+    fn meet<S: Simd>(origin: WideVector<S>, direction: WideVector<S>) -> Meeting<S>;
 
-    /// How a ray passes the body of these half extents; all in the body's frame, in metres.
-    fn pass(half_m: &Vector3<f64>, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Passing;
+    /// How rays pass the body of these half extents; all in the body's frame, in metres.
+    fn pass<S: Simd>(half_m: WideVector<S>, origin: WideVector<S>, direction: WideVector<S>) -> Passing<S>;
 
     /// Radius of the ball round the body's middle that holds it [m].
     fn bounding_radius(half_m: &Vector3<f64>) -> f64;

@@ -1,11 +1,73 @@
-use nalgebra::Vector3;
-
 /// Most parameters of a body: shift and turn in its own axes, ln of its half extents.
 pub(crate) const MOST: usize = 9;
 
 /// Parameters of a solid: a round one has no turn about z and one half extent for x and y.
 pub(crate) const fn parameters(round: bool) -> usize {
     if round { 7 } else { 9 }
+}
+
+/// Numbers that come with a residual: its derivatives, nothing for those that a round solid has not, and itself.
+pub(crate) const COLUMNS: usize = MOST + 1;
+
+/// The columns of one residual: derivatives, and the residual where a solid has fewer.
+const WIDTH: usize = 8;
+
+/// The sums of a [`System`] while residuals come one after another: products of a residual's numbers with the first
+/// [`WIDTH`] of them at a time. In each sum the residuals are added in the order they come.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sums<const ROUND: bool> {
+    pub(crate) cost: f64,
+    products: [[f64; WIDTH]; COLUMNS],
+    /// Of a solid that is not round: of its last derivative with itself and with the residual.
+    last: [f64; 2],
+}
+
+impl<const ROUND: bool> Sums<ROUND> {
+    pub(crate) const fn zero() -> Self {
+        Self { cost: 0.0, products: [[0.0; WIDTH]; COLUMNS], last: [0.0; 2] }
+    }
+
+    /// Adds a residual with its derivatives: the first 7 or 9 numbers of `columns`, and the residual as the next.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, columns: &[f64; COLUMNS]) {
+        let count = parameters(ROUND);
+        let residual = columns[count];
+        self.cost += residual * residual;
+        let mut first = [0.0; WIDTH];
+        first.copy_from_slice(&columns[..WIDTH]);
+        let rows = if ROUND { count } else { COLUMNS };
+        for (sums, &by) in self.products.iter_mut().zip(columns).take(rows) {
+            for (sum, factor) in sums.iter_mut().zip(first) {
+                *sum += by * factor;
+            }
+        }
+        if !ROUND {
+            self.last[0] += columns[MOST - 1] * columns[MOST - 1];
+            self.last[1] += columns[MOST - 1] * residual;
+        }
+    }
+
+    /// What came together.
+    #[inline(always)]
+    pub(crate) fn system(&self) -> System {
+        let count = parameters(ROUND);
+        let mut system = System::zero();
+        system.cost = self.cost;
+        for i in 0..count {
+            for j in 0..=i.min(WIDTH - 1) {
+                system.curvature[i][j] = self.products[i][j];
+            }
+            system.gradient[i] = match (ROUND, i) {
+                (true, _) => self.products[i][WIDTH - 1],
+                (false, WIDTH) => self.last[1],
+                (false, _) => self.products[MOST][i],
+            };
+        }
+        if !ROUND {
+            system.curvature[WIDTH][WIDTH] = self.last[0];
+        }
+        system
+    }
 }
 
 /// Sum of squares and its Gauss–Newton approximation: gradient Jᵀr and curvature JᵀJ (lower triangle).
@@ -19,20 +81,6 @@ pub(crate) struct System {
 impl System {
     pub(crate) const fn zero() -> Self {
         Self { cost: 0.0, gradient: [0.0; MOST], curvature: [[0.0; MOST]; MOST] }
-    }
-
-    /// Adds a residual whose derivative is `factor` times the way outward along `normal` of the surface's point.
-    #[inline(always)]
-    pub(crate) fn add(&mut self, round: bool, residual: f64, factor: f64, normal: &Vector3<f64>, point: &Vector3<f64>) {
-        let row = row(round, factor, normal, point);
-        self.cost += residual * residual;
-        let count = parameters(round);
-        for i in 0..count {
-            self.gradient[i] += row[i] * residual;
-            for j in 0..=i {
-                self.curvature[i][j] += row[i] * row[j];
-            }
-        }
     }
 
     /// Adds a residual that depends on the sizes alone: the `count` parameters from `first` on.
@@ -57,18 +105,6 @@ impl System {
         let mut x = self.gradient;
         solve(&factor, count, &mut x);
         Some(x)
-    }
-}
-
-#[inline(always)]
-fn row(round: bool, factor: f64, normal: &Vector3<f64>, point: &Vector3<f64>) -> [f64; MOST] {
-    let n = normal * factor;
-    let turn = point.cross(&n);
-    let grow = n.component_mul(point);
-    if round {
-        [n.x, n.y, n.z, turn.x, turn.y, grow.x + grow.y, grow.z, 0.0, 0.0]
-    } else {
-        [n.x, n.y, n.z, turn.x, turn.y, turn.z, grow.x, grow.y, grow.z]
     }
 }
 

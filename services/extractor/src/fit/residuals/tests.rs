@@ -1,13 +1,17 @@
 //! First derivatives against central differences, at random bodies and rays.
 
+use nalgebra::Matrix3;
+use pulp::Scalar;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::super::Kind;
 use super::super::descent::moved;
+use super::super::sight::{Residuals, soften};
 use super::super::solid::for_kind;
 use super::super::system::MOST;
-use super::super::tests::{V, at_outline, meet, random, random_aim, random_body, settings};
+use super::super::tests::{V, at_outline, meet, narrow, random, random_aim, random_body, settings, wide};
+use super::super::wide::Wide;
+use super::super::{Kind, Ray};
 use super::*;
 
 const SIGMA_M: f64 = 0.02;
@@ -21,25 +25,33 @@ fn nudged(kind: Kind, body: &Body, parameter: usize, by: f64) -> Body {
     for_kind!(kind, S => moved::<S>(body, &step))
 }
 
-/// The derivative of a residual with respect to every parameter, as the system adds it up.
-fn row(kind: Kind, residual: &Residual) -> [f64; MOST] {
-    let &(_, factor, ref normal, ref point) = residual;
-    let mut system = System::zero();
-    system.add(kind.is_round(), 1.0, factor, normal, point);
-    system.gradient
+/// A residual and its derivatives with respect to every parameter, as the sums take them.
+type Row = (f64, [f64; MOST]);
+
+fn row(kind: Kind, residuals: &Residuals<Scalar>) -> Row {
+    let mut columns = [[0.0; MOST_LANES]; COLUMNS];
+    residuals.store(kind.is_round(), &mut columns);
+    let (row, count) = (row_of(&columns, 0), parameters(kind.is_round()));
+    (row[count], std::array::from_fn(|parameter| if parameter < count { row[parameter] } else { 0.0 }))
 }
 
-fn hit_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Residual {
-    for_kind!(kind, S => hit::<S>(&Sight::new(body), ray, SIGMA_M, how))
+fn hit_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Row {
+    let sight = Sight::new(Scalar, body, SIGMA_M);
+    let ray = (wide(&ray.direction), sight.all(ray.range_m));
+    row(kind, &for_kind!(kind, S => hit::<S, Scalar>(&sight, ray, how)))
 }
 
-fn miss_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Option<Residual> {
-    for_kind!(kind, S => miss::<S>(&Sight::new(body), ray, SIGMA_M, how))
+fn miss_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Option<Row> {
+    let sight = Sight::new(Scalar, body, SIGMA_M);
+    let ray = (wide(&ray.direction), sight.all(ray.range_m));
+    let radius_m = for_kind!(kind, S => S::bounding_radius(&body.ln_half.map(f64::exp)));
+    let (_, residuals) = for_kind!(kind, S => miss::<S, Scalar>(&sight, ray, radius_m, how))?;
+    Some(row(kind, &residuals))
 }
 
 /// Asserts that `of` changes as its row says, within `tolerance` of the row's length.
-fn check(kind: Kind, body: &Body, tolerance: f64, of: impl Fn(&Body) -> Residual) {
-    let row = row(kind, &of(body));
+fn check(kind: Kind, body: &Body, tolerance: f64, of: impl Fn(&Body) -> Row) {
+    let (_, row) = of(body);
     let length = row.iter().map(|d| d * d).sum::<f64>().sqrt();
     for (parameter, derivative) in row.iter().enumerate().take(parameters(kind.is_round())) {
         let [more, less] = [STEP, -STEP].map(|by| of(&nudged(kind, body, parameter, by)).0);
@@ -98,7 +110,7 @@ fn a_hit_on_the_very_apex_of_a_cone_has_derivatives() {
     for how in [Measure::Near, Measure::Range] {
         let residual = hit_of(Kind::Cone, &body, &ray, how);
         assert!((residual.0.abs() - 5.0).abs() < 1.1, "{}", residual.0);
-        assert!(row(Kind::Cone, &residual).iter().all(|d| d.is_finite()), "{how:?}");
+        assert!(residual.1.iter().all(|d| d.is_finite()), "{how:?}");
     }
 }
 
@@ -126,7 +138,8 @@ fn hits_beside_and_misses_in_the_way_change_as_their_derivatives_say() {
 fn beliefs_change_as_their_derivatives_say() {
     let mut random = random(33);
     let beliefs = settings().beliefs;
-    let rays = Rays { hits: &[], misses: &[], sigma_m: SIGMA_M, beliefs: &beliefs };
+    let none = Beam::new(0);
+    let rays = Rays { arch: Arch::new(), hits: &none, misses: &none, sigma_m: SIGMA_M, beliefs: &beliefs };
     for kind in Kind::ALL {
         for _ in 0..100 {
             let body = random_body(kind, &mut random);
@@ -144,11 +157,16 @@ fn beliefs_change_as_their_derivatives_say() {
     }
 }
 
+fn soften_one(residual: f64) -> (f64, f64) {
+    let (soft, slope) = soften(Wide::splat(Scalar, residual));
+    (narrow(soft), narrow(slope))
+}
+
 #[test]
 fn a_residual_is_softened_without_a_jump_in_value_or_slope() {
     for residual in [0.0, 1.0, -3.9, 3.999_999, 4.0, 4.000_001, -7.0, 1e3, -1e9] {
-        let (soft, slope) = soften(residual);
-        let difference = (soften(residual + 1e-6).0 - soften(residual - 1e-6).0) / 2e-6;
+        let (soft, slope) = soften_one(residual);
+        let difference = (soften_one(residual + 1e-6).0 - soften_one(residual - 1e-6).0) / 2e-6;
         assert!((slope - difference).abs() < 1e-5, "{residual}");
         assert!(soft.abs() <= residual.abs() && soft * residual >= 0.0);
         assert!(residual.abs() >= 4.0 || soft == residual);

@@ -172,7 +172,7 @@ fn rays_along_axes_and_generators_and_through_the_apex_meet_as_geometry_says() {
     ];
     for (index, (kind, origin, direction, expected)) in cases.into_iter().enumerate() {
         let (origin, direction) = (V::from(origin), V::from(direction));
-        let found = for_kind!(kind, S => S::meet(&origin, &direction)).map(|meeting| meeting.distance);
+        let found = meet_unit(kind, &origin, &direction).map(|meeting| meeting.distance);
         match (found, expected) {
             (Some(found), Some(expected)) => assert!((found - expected).abs() < 1e-12, "case {index}: {found}"),
             _ => assert_eq!(found, expected, "case {index}"),

@@ -4,14 +4,18 @@ mod fits;
 mod meeting;
 mod passing;
 mod recovery;
+mod same;
 mod stand;
+mod twin;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+pub(crate) use self::twin::{Meeting, Passing};
 use super::solid::for_kind;
-use super::{Body, FitParams, FitSettings, Kind, Meeting, Ray, UnitSolid};
+use super::wide::{Wide, WideVector};
+use super::{Body, FitParams, FitSettings, Kind, Ray, UnitSolid};
 
 pub(crate) type V = Vector3<f64>;
 
@@ -66,11 +70,44 @@ pub(crate) fn to_body(body: &Body, direction: &V) -> (V, V) {
     (-body.rotation.tr_mul(&body.centre_m), body.rotation.tr_mul(direction))
 }
 
+/// A vector for one ray.
+pub(crate) fn wide(v: &V) -> WideVector<pulp::Scalar> {
+    [v.x, v.y, v.z].map(|component| Wide::splat(pulp::Scalar, component))
+}
+
+/// The number of one ray.
+pub(crate) fn narrow(wide: Wide<pulp::Scalar>) -> f64 {
+    let mut value = [0.0];
+    wide.store(&mut value);
+    value[0]
+}
+
+pub(crate) fn narrow_vector(wide: WideVector<pulp::Scalar>) -> V {
+    V::from(wide.map(narrow))
+}
+
+/// Where one ray meets the solid of unit half extents.
+pub(crate) fn meet_unit(kind: Kind, origin: &V, direction: &V) -> Option<Meeting> {
+    let meeting = for_kind!(kind, S => S::meet(wide(origin), wide(direction)));
+    let found = meeting.found.any();
+    found.then(|| Meeting { distance: narrow(meeting.distance), normal: narrow_vector(meeting.normal) })
+}
+
+/// How one ray passes a body of these half extents.
+pub(crate) fn pass(kind: Kind, half_m: &V, origin: &V, direction: &V) -> Passing {
+    let passing = for_kind!(kind, S => S::pass(wide(half_m), wide(origin), wide(direction)));
+    Passing {
+        distance_m: narrow(passing.distance_m),
+        normal: narrow_vector(passing.normal),
+        point_m: narrow_vector(passing.point_m),
+    }
+}
+
 /// Where a ray from the sensor meets a body; distances in metres.
 pub(crate) fn meet(kind: Kind, body: &Body, direction: &V) -> Option<Meeting> {
     let half_m = body.ln_half.map(f64::exp);
     let (origin, direction) = to_body(body, direction);
-    for_kind!(kind, S => S::meet(&origin.component_div(&half_m), &direction.component_div(&half_m)))
+    meet_unit(kind, &origin.component_div(&half_m), &direction.component_div(&half_m))
 }
 
 /// Negative within the body of these half extents, positive without: written from the solids' definitions.

@@ -1,6 +1,5 @@
 //! How rays pass each solid, against the support functions of their definitions.
 
-use super::super::silhouette::Passing;
 use super::*;
 
 /// The signed distance of a ray to a body's outline: the most of u·o − h(u) over directions u across the ray.
@@ -21,10 +20,6 @@ fn brute_force(kind: Kind, half_m: &V, origin: &V, direction: &V) -> f64 {
         if out(one) > out(other) { high = other } else { low = one }
     }
     out(0.5 * (low + high)).max(out(best))
-}
-
-fn pass(kind: Kind, half_m: &V, origin: &V, direction: &V) -> Passing {
-    for_kind!(kind, S => S::pass(half_m, origin, direction))
 }
 
 /// Found and true distance of many rays that pass bodies within or without, off by less than a quarter of the smallest
