@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::rays::{Beam, MOST_LANES};
-use super::sight::{BEFORE, Sight, hit, miss, row_of};
-use super::system::{COLUMNS, Sums, System, parameters};
+use super::sight::{BEFORE, Sight, hit, miss};
+use super::system::{Row, Sums, System, parameters};
 use super::{Beliefs, Body, UnitSolid};
 
 /// How hits are measured.
@@ -84,37 +84,34 @@ impl<K: UnitSolid, const ROUND: bool> WithSimd for Sum<'_, K, ROUND> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { body, rays, how, limit, .. } = self;
-        let sight = Sight::new(simd, body, rays.sigma_m);
-        let mut sums = Sums::<ROUND>::zero();
+        let sight = Sight::new::<K>(simd, body, rays.sigma_m);
+        let mut sums = Sums::<S, ROUND>::zero(simd);
         let mut parts = Parts::default();
-        let mut columns = [[0.0; MOST_LANES]; COLUMNS];
+        let mut rows = [Row::ZERO; MOST_LANES];
 
         for first in (0..rays.hits.len()).step_by(S::F64_LANES) {
-            hit::<K, S>(&sight, rays.hits.group(simd, first / S::F64_LANES), how).store(ROUND, &mut columns);
-            for lane in 0..S::F64_LANES.min(rays.hits.len() - first) {
-                let row = row_of(&columns, lane);
-                parts.strayed += u32::from(row[parameters(ROUND)].abs() > BEFORE);
-                sums.add(&row);
+            hit::<K, S>(&sight, rays.hits.group(simd, first / S::F64_LANES), how).store::<ROUND>(&mut rows);
+            for row in rows.iter().take(S::F64_LANES.min(rays.hits.len() - first)) {
+                parts.strayed += u32::from(row.0[parameters(ROUND)].abs() > BEFORE);
+                sums.add(row);
                 parts.hits = sums.cost;
                 if sums.cost >= limit {
                     return (sums.system(), parts);
                 }
             }
         }
-        let radius_m = K::bounding_radius(&body.ln_half.map(f64::exp));
         for first in (0..rays.misses.len()).step_by(S::F64_LANES) {
             let group = rays.misses.group(simd, first / S::F64_LANES);
-            let Some((violated, residuals)) = miss::<K, S>(&sight, group, radius_m, how) else { continue };
-            residuals.store(ROUND, &mut columns);
+            let Some((violated, residuals)) = miss::<K, S>(&sight, group, how) else { continue };
+            residuals.store::<ROUND>(&mut rows);
             let mut chosen = [0.0; MOST_LANES];
             violated.choose(sight.all(1.0), sight.all(0.0)).store(&mut chosen);
-            let lanes = chosen.iter().enumerate().take(S::F64_LANES.min(rays.misses.len() - first));
-            for (lane, _) in lanes.filter(|&(_, &chosen)| chosen > 0.0) {
-                let row = row_of(&columns, lane);
-                let residual = row[parameters(ROUND)];
+            let lanes = rows.iter().zip(&chosen).take(S::F64_LANES.min(rays.misses.len() - first));
+            for (row, _) in lanes.filter(|&(_, &chosen)| chosen > 0.0) {
+                let residual = row.0[parameters(ROUND)];
                 parts.violated += 1;
                 parts.misses += residual * residual;
-                sums.add(&row);
+                sums.add(row);
                 if sums.cost >= limit {
                     return (sums.system(), parts);
                 }

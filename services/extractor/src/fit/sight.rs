@@ -5,7 +5,7 @@ use pulp::Simd;
 
 use super::rays::MOST_LANES;
 use super::residuals::Measure;
-use super::system::COLUMNS;
+use super::system::Row;
 use super::wide::{Which, Wide, WideVector, along, cross, dot, norm, opposite, plus, scale, shrink, times};
 use super::{Body, UnitSolid};
 
@@ -22,16 +22,6 @@ pub(crate) const BEFORE: f64 = 3.0;
 /// Residual from which on it is softened.
 const SOFT: f64 = 4.0;
 
-/// The numbers of one ray.
-#[inline(always)]
-pub(crate) fn row_of(columns: &[[f64; MOST_LANES]; COLUMNS], lane: usize) -> [f64; COLUMNS] {
-    let mut row = [0.0; COLUMNS];
-    for (value, column) in row.iter_mut().zip(columns) {
-        *value = column[lane];
-    }
-    row
-}
-
 /// The sensor as the body sees it.
 pub(crate) struct Sight<S: Simd> {
     /// The body's middle [m], sensor frame.
@@ -44,13 +34,15 @@ pub(crate) struct Sight<S: Simd> {
     origin: WideVector<S>,
     /// The sensor in units of the half extents.
     unit_origin: WideVector<S>,
+    /// Of the ball round the body's middle that holds it [m].
+    radius_m: f64,
     sigma_m: f64,
     per_m: f64,
 }
 
 impl<S: Simd> Sight<S> {
     #[inline(always)]
-    pub(crate) fn new(simd: S, body: &Body, sigma_m: f64) -> Self {
+    pub(crate) fn new<K: UnitSolid>(simd: S, body: &Body, sigma_m: f64) -> Self {
         let to_body = body.rotation.transpose();
         let half_m = body.ln_half.map(f64::exp);
         let per_half = half_m.map(|half| 1.0 / half);
@@ -64,6 +56,7 @@ impl<S: Simd> Sight<S> {
             per_half: wide(&per_half),
             origin: wide(&origin),
             unit_origin: wide(&origin.component_mul(&per_half)),
+            radius_m: K::bounding_radius(&half_m),
             sigma_m,
             per_m: 1.0 / sigma_m,
         }
@@ -94,32 +87,28 @@ pub(crate) struct Residuals<S: Simd> {
 }
 
 impl<S: Simd> Residuals<S> {
-    /// The derivatives with respect to all parameters, one a row, and the residuals in the row after them.
+    /// Derivatives with respect to all parameters, and the residual after them: a row of each ray.
     #[inline(always)]
-    pub(crate) fn store(&self, round: bool, columns: &mut [[f64; MOST_LANES]; COLUMNS]) {
+    pub(crate) fn store<const ROUND: bool>(&self, rows: &mut [Row; MOST_LANES]) {
         let normal = scale(self.normal, self.factor);
         let turn = cross(self.point, normal);
         let grow = times(normal, self.point);
-        let mut next = columns.iter_mut();
-        let mut put = |values: Wide<S>| {
-            if let Some(column) = next.next() {
-                values.store(column);
-            }
-        };
-        for values in normal {
-            put(values);
-        }
-        put(turn[0]);
-        put(turn[1]);
-        if round {
-            put(grow[0] + grow[1]);
+        put(normal[0], rows, 0);
+        put(normal[1], rows, 1);
+        put(normal[2], rows, 2);
+        put(turn[0], rows, 3);
+        put(turn[1], rows, 4);
+        if ROUND {
+            put(grow[0] + grow[1], rows, 5);
+            put(grow[2], rows, 6);
+            put(self.residual, rows, 7);
         } else {
-            put(turn[2]);
-            put(grow[0]);
-            put(grow[1]);
+            put(turn[2], rows, 5);
+            put(grow[0], rows, 6);
+            put(grow[1], rows, 7);
+            put(grow[2], rows, 8);
+            put(self.residual, rows, 9);
         }
-        put(grow[2]);
-        put(self.residual);
     }
 
     /// These where chosen, else the others.
@@ -131,6 +120,16 @@ impl<S: Simd> Residuals<S> {
             normal: chosen.choose_vector(self.normal, other.normal),
             point: chosen.choose_vector(self.point, other.point),
         }
+    }
+}
+
+/// Puts each ray's number at `place` of its row.
+#[inline(always)]
+fn put<S: Simd>(values: Wide<S>, rows: &mut [Row; MOST_LANES], place: usize) {
+    let mut lanes = [0.0; MOST_LANES];
+    values.store(&mut lanes);
+    for (row, lane) in rows.iter_mut().zip(lanes).take(S::F64_LANES) {
+        row.0[place] = lane;
     }
 }
 
@@ -156,7 +155,7 @@ pub(crate) fn hit<K: UnitSolid, S: Simd>(
     let met = match how {
         Measure::Near => Residuals { residual: -beyond * cosine, factor: -per_m, normal, point },
         Measure::Range => {
-            let (residual, slope) = soften(beyond);
+            let (residual, slope) = soften(meeting.found.choose(beyond, sight.all(0.0)));
             Residuals { residual, factor: per_m / cosine * slope, normal, point }
         }
     };
@@ -169,7 +168,8 @@ pub(crate) fn hit<K: UnitSolid, S: Simd>(
     let passed = match how {
         Measure::Near => Residuals { residual: beside, factor: -per_m, normal, point },
         Measure::Range => {
-            let (residual, slope) = soften(sight.all(BESIDE) + sight.all(BESIDE_GROWTH) * beside);
+            let beside = sight.all(BESIDE) + sight.all(BESIDE_GROWTH) * beside;
+            let (residual, slope) = soften(meeting.found.choose(sight.all(0.0), beside));
             Residuals { residual, factor: sight.all(-BESIDE_GROWTH) * per_m * slope, normal, point }
         }
     };
@@ -181,11 +181,10 @@ pub(crate) fn hit<K: UnitSolid, S: Simd>(
 pub(crate) fn miss<K: UnitSolid, S: Simd>(
     sight: &Sight<S>,
     rays: (WideVector<S>, Wide<S>),
-    radius_m: f64,
     how: Measure,
 ) -> Option<(Which<S>, Residuals<S>)> {
     let (direction, range_m) = rays;
-    let radius_m = sight.all(radius_m);
+    let radius_m = sight.all(sight.radius_m);
     let along_m = dot(sight.centre_m, direction);
     let off_m2 = dot(sight.centre_m, sight.centre_m) - along_m * along_m;
     let near = !((along_m - radius_m).greater(range_m) | off_m2.greater(radius_m * radius_m));
@@ -204,13 +203,14 @@ pub(crate) fn miss<K: UnitSolid, S: Simd>(
     let depth = (-passing.distance_m).max(sight.all(0.0)) * per_m;
     let (residual, slope) = match how {
         Measure::Near => (depth, sight.all(1.0)),
-        Measure::Range => soften(depth + sight.all(IN_THE_WAY)),
+        Measure::Range => soften(violated.choose(depth + sight.all(IN_THE_WAY), sight.all(0.0))),
     };
     let residuals = Residuals { residual, factor: per_m * slope, normal: passing.normal, point: passing.point_m };
     Some((violated, residuals))
 }
 
-/// A residual whose size grows with its logarithm only beyond [`SOFT`], and the slope.
+/// Residuals whose size grows with their logarithm only beyond [`SOFT`], and the slopes. A logarithm takes long: rays that
+/// do not count have residuals of 0.
 #[inline(always)]
 pub(crate) fn soften<S: Simd>(residual: Wide<S>) -> (Wide<S>, Wide<S>) {
     let one = residual.all(1.0);

@@ -1,3 +1,5 @@
+use pulp::Simd;
+
 /// Most parameters of a body: shift and turn in its own axes, ln of its half extents.
 pub(crate) const MOST: usize = 9;
 
@@ -6,44 +8,53 @@ pub(crate) const fn parameters(round: bool) -> usize {
     if round { 7 } else { 9 }
 }
 
-/// Numbers that come with a residual: its derivatives, nothing for those that a round solid has not, and itself.
-pub(crate) const COLUMNS: usize = MOST + 1;
+/// Numbers of one residual: its derivatives, 7 or 9, and itself after them.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct Row(pub(crate) [f64; 2 * WIDTH]);
 
-/// The columns of one residual: derivatives, and the residual where a solid has fewer.
+impl Row {
+    pub(crate) const ZERO: Self = Self([0.0; 2 * WIDTH]);
+}
+
+/// Sums that lie side by side.
 const WIDTH: usize = 8;
 
-/// The sums of a [`System`] while residuals come one after another: products of a residual's numbers with the first
-/// [`WIDTH`] of them at a time. In each sum the residuals are added in the order they come.
+/// The sums of a [`System`] while residuals come one after another: products of each of a row's numbers with the first
+/// [`WIDTH`] of them. In each sum the residuals are added in the order they come.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sums<const ROUND: bool> {
+pub(crate) struct Sums<S: Simd, const ROUND: bool> {
+    simd: S,
     pub(crate) cost: f64,
-    products: [[f64; WIDTH]; COLUMNS],
+    products: [Row; 5],
     /// Of a solid that is not round: of its last derivative with itself and with the residual.
     last: [f64; 2],
 }
 
-impl<const ROUND: bool> Sums<ROUND> {
-    pub(crate) const fn zero() -> Self {
-        Self { cost: 0.0, products: [[0.0; WIDTH]; COLUMNS], last: [0.0; 2] }
+impl<S: Simd, const ROUND: bool> Sums<S, ROUND> {
+    #[inline(always)]
+    pub(crate) fn zero(simd: S) -> Self {
+        Self { simd, cost: 0.0, products: [Row::ZERO; 5], last: [0.0; 2] }
     }
 
-    /// Adds a residual with its derivatives: the first 7 or 9 numbers of `columns`, and the residual as the next.
     #[inline(always)]
-    pub(crate) fn add(&mut self, columns: &[f64; COLUMNS]) {
+    pub(crate) fn add(&mut self, row: &Row) {
         let count = parameters(ROUND);
-        let residual = columns[count];
+        let residual = row.0[count];
         self.cost += residual * residual;
-        let mut first = [0.0; WIDTH];
-        first.copy_from_slice(&columns[..WIDTH]);
-        let rows = if ROUND { count } else { COLUMNS };
-        for (sums, &by) in self.products.iter_mut().zip(columns).take(rows) {
-            for (sum, factor) in sums.iter_mut().zip(first) {
-                *sum += by * factor;
+        let (first, _) = S::as_simd_f64s(&row.0[..WIDTH]);
+        // A round solid's residual is among the first numbers itself.
+        let rows = if ROUND { count } else { MOST + 1 };
+        let sums = self.products.iter_mut().flat_map(|pair| pair.0.chunks_exact_mut(WIDTH));
+        for (sums, &by) in sums.zip(&row.0).take(rows) {
+            let by = self.simd.splat_f64s(by);
+            for (sum, &first) in S::as_mut_simd_f64s(sums).0.iter_mut().zip(first) {
+                *sum = self.simd.add_f64s(*sum, self.simd.mul_f64s(by, first));
             }
         }
         if !ROUND {
-            self.last[0] += columns[MOST - 1] * columns[MOST - 1];
-            self.last[1] += columns[MOST - 1] * residual;
+            self.last[0] += row.0[MOST - 1] * row.0[MOST - 1];
+            self.last[1] += row.0[MOST - 1] * residual;
         }
     }
 
@@ -53,14 +64,15 @@ impl<const ROUND: bool> Sums<ROUND> {
         let count = parameters(ROUND);
         let mut system = System::zero();
         system.cost = self.cost;
+        let product = |i: usize, j: usize| self.products[i / 2].0[i % 2 * WIDTH + j];
         for i in 0..count {
             for j in 0..=i.min(WIDTH - 1) {
-                system.curvature[i][j] = self.products[i][j];
+                system.curvature[i][j] = product(i, j);
             }
             system.gradient[i] = match (ROUND, i) {
-                (true, _) => self.products[i][WIDTH - 1],
+                (true, _) => product(i, WIDTH - 1),
                 (false, WIDTH) => self.last[1],
-                (false, _) => self.products[MOST][i],
+                (false, _) => product(MOST, i),
             };
         }
         if !ROUND {
@@ -96,19 +108,29 @@ impl System {
 
     /// Solves (JᵀJ + λ diag(JᵀJ) + 10⁻³) x = Jᵀr by Cholesky's decomposition; none where that fails.
     pub(crate) fn step(&self, round: bool, damping: f64) -> Option<[f64; MOST]> {
-        let count = parameters(round);
+        if round {
+            self.step_of::<{ parameters(true) }>(damping)
+        } else {
+            self.step_of::<{ parameters(false) }>(damping)
+        }
+    }
+
+    /// With the count of parameters known beforehand.
+    #[inline(always)]
+    fn step_of<const COUNT: usize>(&self, damping: f64) -> Option<[f64; MOST]> {
         let mut factor = self.curvature;
-        for (i, row) in factor.iter_mut().enumerate().take(count) {
+        for (i, row) in factor.iter_mut().enumerate().take(COUNT) {
             row[i] += row[i] * damping + 1e-3;
         }
-        decompose(&mut factor, count)?;
+        decompose(&mut factor, COUNT)?;
         let mut x = self.gradient;
-        solve(&factor, count, &mut x);
+        solve(&factor, COUNT, &mut x);
         Some(x)
     }
 }
 
 /// Cholesky's decomposition in place (lower triangle) of the first `count` rows; none where not positive definite.
+#[inline(always)]
 pub(crate) fn decompose(matrix: &mut [[f64; MOST]; MOST], count: usize) -> Option<()> {
     for i in 0..count {
         for j in 0..=i {
@@ -127,6 +149,7 @@ pub(crate) fn decompose(matrix: &mut [[f64; MOST]; MOST], count: usize) -> Optio
 }
 
 /// Solves L Lᵀ x = b for the factor L of [`decompose`]; `x` is b before and x after.
+#[inline(always)]
 pub(crate) fn solve(factor: &[[f64; MOST]; MOST], count: usize, x: &mut [f64; MOST]) {
     for i in 0..count {
         for j in 0..i {

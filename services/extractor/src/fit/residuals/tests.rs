@@ -29,23 +29,26 @@ fn nudged(kind: Kind, body: &Body, parameter: usize, by: f64) -> Body {
 type Row = (f64, [f64; MOST]);
 
 fn row(kind: Kind, residuals: &Residuals<Scalar>) -> Row {
-    let mut columns = [[0.0; MOST_LANES]; COLUMNS];
-    residuals.store(kind.is_round(), &mut columns);
-    let (row, count) = (row_of(&columns, 0), parameters(kind.is_round()));
+    let (mut rows, count) = ([super::Row::ZERO; MOST_LANES], parameters(kind.is_round()));
+    if kind.is_round() {
+        residuals.store::<true>(&mut rows)
+    } else {
+        residuals.store::<false>(&mut rows)
+    }
+    let row = rows[0].0;
     (row[count], std::array::from_fn(|parameter| if parameter < count { row[parameter] } else { 0.0 }))
 }
 
 fn hit_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Row {
-    let sight = Sight::new(Scalar, body, SIGMA_M);
+    let sight = for_kind!(kind, S => Sight::new::<S>(Scalar, body, SIGMA_M));
     let ray = (wide(&ray.direction), sight.all(ray.range_m));
     row(kind, &for_kind!(kind, S => hit::<S, Scalar>(&sight, ray, how)))
 }
 
 fn miss_of(kind: Kind, body: &Body, ray: &Ray, how: Measure) -> Option<Row> {
-    let sight = Sight::new(Scalar, body, SIGMA_M);
+    let sight = for_kind!(kind, S => Sight::new::<S>(Scalar, body, SIGMA_M));
     let ray = (wide(&ray.direction), sight.all(ray.range_m));
-    let radius_m = for_kind!(kind, S => S::bounding_radius(&body.ln_half.map(f64::exp)));
-    let (_, residuals) = for_kind!(kind, S => miss::<S, Scalar>(&sight, ray, radius_m, how))?;
+    let (_, residuals) = for_kind!(kind, S => miss::<S, Scalar>(&sight, ray, how))?;
     Some(row(kind, &residuals))
 }
 
