@@ -88,18 +88,20 @@ pub(crate) struct Query {
     sparse: usize,
     /// x·s for each support vector of a span, of rare bins alone.
     rare: [[f32; TILE]; TILES],
-    pub(crate) sums: Sums,
+    /// The sums, in parts that are added side by side.
+    lanes: [[[f64; LANES]; MAX_CLASSES - 1]; MAX_CLASSES],
 }
 
 impl Query {
     pub(crate) const fn new() -> Self {
-        let sums = Sums([[0.0; MAX_CLASSES - 1]; MAX_CLASSES]);
-        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, rare: [[0.0; TILE]; TILES], sums }
+        let lanes = [[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES];
+        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, rare: [[0.0; TILE]; TILES], lanes }
     }
 
     /// Takes a descriptor: bins in order of index, each index under 1728 and given once.
     pub(crate) fn set(&mut self, kernels: &Kernels, bins: &[Bin]) {
-        (self.dense, self.sparse, self.sums) = (0, BINS, Sums::default());
+        (self.dense, self.sparse) = (0, BINS);
+        self.lanes = [[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES];
         for bin in bins {
             match kernels.row_of_bin[bin.index as usize] {
                 Row::Unused => {}
@@ -114,6 +116,11 @@ impl Query {
             }
         }
         self.norm2 = squared_norm(bins);
+    }
+
+    /// The sums that [`Kernels::sum`] has made.
+    pub(crate) fn sums(&self) -> Sums {
+        Sums(self.lanes.map(|of_class| of_class.map(|lanes| lanes.iter().sum())))
     }
 
     /// Makes `rare` for a span, given its lists.
@@ -228,10 +235,8 @@ impl WithSimd for Sum<'_> {
                         let distance2 = query.norm2 + of_vector - 2.0 * *product;
                         *product = exp_of_negative(-kernels.gamma * if distance2 > 0.0 { distance2 } else { 0.0 });
                     }
-                    let sums = &mut query.sums.0[span.class];
-                    for (sum, part) in sums.iter_mut().zip(weighted(&kernel, &tile.coefficients)) {
-                        *sum += part;
-                    }
+                    let sums = &mut query.lanes[span.class];
+                    add_weighted(simd, sums, &kernel, &tile.coefficients);
                 }
             }
         }
@@ -270,18 +275,30 @@ fn add_row<S: Simd>(simd: S, sums: &mut [S::f32s; ABREAST], row: &[f32; TILE], f
     }
 }
 
-/// Sums of kernel values times each row of coefficients.
+/// Adds kernel values times each row of coefficients, lane by lane: so the sums are the same on every machine.
 #[inline(always)]
-fn weighted(kernel: &[f32; TILE], coefficients: &[[f64; TILE]; MAX_CLASSES - 1]) -> [f64; MAX_CLASSES - 1] {
-    let mut lanes = [[0.0_f64; LANES]; MAX_CLASSES - 1];
-    for from in (0..TILE).step_by(LANES) {
-        for (lanes, coefficients) in lanes.iter_mut().zip(coefficients) {
-            for lane in 0..LANES {
-                lanes[lane] += f64::from(kernel[from + lane]) * coefficients[from + lane];
+fn add_weighted<S: Simd>(
+    simd: S,
+    sums: &mut [[f64; LANES]; MAX_CLASSES - 1],
+    kernel: &[f32; TILE],
+    coefficients: &[[f64; TILE]; MAX_CLASSES - 1],
+) {
+    let mut wide = [0.0; TILE];
+    for (wide, &value) in wide.iter_mut().zip(kernel) {
+        *wide = f64::from(value);
+    }
+    let (kernel, _) = S::as_simd_f64s(&wide);
+    for (sums, coefficients) in sums.iter_mut().zip(coefficients) {
+        let (sums, _) = S::as_mut_simd_f64s(sums);
+        let (coefficients, _) = S::as_simd_f64s(coefficients);
+        for (place, sum) in sums.iter_mut().enumerate() {
+            let mut total = *sum;
+            for place in (place..kernel.len()).step_by(LANES / S::F64_LANES) {
+                total = simd.add_f64s(total, simd.mul_f64s(kernel[place], coefficients[place]));
             }
+            *sum = total;
         }
     }
-    lanes.map(|lanes| lanes.iter().sum())
 }
 
 fn squared_norm(bins: &[Bin]) -> f32 {

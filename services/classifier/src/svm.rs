@@ -69,7 +69,7 @@ impl Svm {
         let mut query = [Query::new()];
         query[0].set(&self.kernels, bins);
         self.kernels.sum(&mut query);
-        self.decision(&query[0].sums)
+        self.decision(&query[0].sums())
     }
 
     /// [`Svm::decide`] for many descriptors, several at a time, which is faster; gives `each` the descriptor's place and
@@ -89,7 +89,7 @@ impl Svm {
             }
             self.kernels.sum(&mut queries[..taken]);
             for (place, query) in (first..).zip(&queries[..taken]) {
-                each(self, place, self.decision(&query.sums));
+                each(self, place, self.decision(&query.sums()));
             }
             first += taken;
             if taken < TOGETHER {
