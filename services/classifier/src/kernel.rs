@@ -15,7 +15,7 @@ use crate::svm_file::SvmFile;
 const TILE: usize = 64;
 
 /// Tiles of a span, for which lists of rare bins are kept: longer ones than of a tile, so that few are empty.
-const TILES: usize = 8;
+const TILES: usize = 16;
 
 /// Vector registers that hold products, twice.
 const ABREAST: usize = 4;
@@ -25,6 +25,11 @@ const LANES: usize = 8;
 
 /// A bin that fewer support vectors have than one in this many is kept as a list of those that have it.
 const RARE: usize = 16;
+
+/// Numbers that begin where a cache line does: vectors of them are then each read from one line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Aligned<T>(T);
 
 /// Where a bin's values stand.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +54,7 @@ pub(crate) struct Kernels {
     spans: Vec<Span>,
     dense_rows: usize,
     /// Tile after tile, and in each a row for each dense bin.
-    dense: Vec<[f32; TILE]>,
+    dense: Vec<Aligned<[f32; TILE]>>,
     sparse_rows: usize,
     /// Span after span, and in each for each sparse bin, where its list begins in `sparse`; at last its end.
     lists: Vec<u32>,
@@ -178,7 +183,7 @@ impl Kernels {
         let empty = Tile { norm2: [0.0; TILE], coefficients: [[0.0; TILE]; MAX_CLASSES - 1] };
         let tiles = vec![empty; places.len().div_ceil(TILE)];
         let mut span = Span { class, first_row: self.dense.len(), tiles };
-        self.dense.resize(span.first_row + span.tiles.len() * self.dense_rows, [0.0; TILE]);
+        self.dense.resize(span.first_row + span.tiles.len() * self.dense_rows, Aligned([0.0; TILE]));
         let mut lists = vec![Vec::new(); self.sparse_rows];
         let vectors = file.vectors[places.clone()].iter().zip(&file.coefficients[places]);
         for (place, (vector, coefficients)) in vectors.enumerate() {
@@ -187,7 +192,7 @@ impl Kernels {
             for bin in vector {
                 match self.row_of_bin[bin.index as usize] {
                     Row::Unused => {}
-                    Row::Dense(row) => self.dense[first_row + row as usize][lane] = bin.weight,
+                    Row::Dense(row) => self.dense[first_row + row as usize].0[lane] = bin.weight,
                     Row::Sparse(row) => lists[row as usize].push((place as u32, bin.weight)),
                 }
             }
@@ -245,7 +250,7 @@ impl WithSimd for Sum<'_> {
 
 /// Adds x·s for each support vector of a tile, without rare bins.
 #[inline(always)]
-fn add_products<S: Simd>(simd: S, result: &mut [f32; TILE], dense: &[[f32; TILE]], rows: &[(u32, f32)]) {
+fn add_products<S: Simd>(simd: S, result: &mut [f32; TILE], dense: &[Aligned<[f32; TILE]>], rows: &[(u32, f32)]) {
     let (vectors, _) = S::as_mut_simd_f32s(result);
     for from in (0..vectors.len()).step_by(ABREAST) {
         // Even and odd rows apart, so that additions need not wait for each other.
@@ -253,11 +258,11 @@ fn add_products<S: Simd>(simd: S, result: &mut [f32; TILE], dense: &[[f32; TILE]
         let (pairs, last) = rows.as_chunks::<2>();
         for pair in pairs {
             for (sums, &(row, weight)) in sums.iter_mut().zip(pair) {
-                add_row(simd, sums, &dense[row as usize], from, weight);
+                add_row(simd, sums, &dense[row as usize].0, from, weight);
             }
         }
         for &(row, weight) in last {
-            add_row(simd, &mut sums[0], &dense[row as usize], from, weight);
+            add_row(simd, &mut sums[0], &dense[row as usize].0, from, weight);
         }
         for place in 0..ABREAST {
             let sum = simd.add_f32s(sums[0][place], sums[1][place]);
