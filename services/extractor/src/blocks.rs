@@ -23,18 +23,25 @@ type Lanes = [f32; LANES];
 #[derive(Debug)]
 pub(crate) struct Blocks {
     count: usize,
-    x: Vec<Lanes>,
-    y: Vec<Lanes>,
-    z: Vec<Lanes>,
-    index: Vec<[u32; LANES]>,
+    blocks: Vec<Block>,
     /// Of the blocks, a row of them at a time.
     boxes: Vec<Boxes>,
     /// Of the rows of blocks, likewise.
     rows: Vec<Boxes>,
 }
 
+/// Points side by side: where they are [m], and their indices. Like all that is read as vectors, it begins where a cache
+/// line does.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Block {
+    at: [Lanes; 3],
+    index: [u32; LANES],
+}
+
 /// Bounding boxes side by side, low and high corner.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Boxes {
     low: [Lanes; 3],
     high: [Lanes; 3],
@@ -53,10 +60,7 @@ impl Blocks {
         let rows = blocks.div_ceil(ROW);
         Self {
             count: 0,
-            x: vec![[0.0; LANES]; blocks],
-            y: vec![[0.0; LANES]; blocks],
-            z: vec![[0.0; LANES]; blocks],
-            index: vec![[0; LANES]; blocks],
+            blocks: vec![Block { at: [[0.0; LANES]; 3], index: [0; LANES] }; blocks],
             boxes: vec![NOWHERE; rows],
             rows: vec![NOWHERE; rows.div_ceil(ROW)],
         }
@@ -90,21 +94,21 @@ impl Blocks {
         self.fill_up();
     }
 
-    fn put(&mut self, place: usize, [x, y, z]: [f32; 3], index: u32) {
-        let (block, lane) = (place / LANES, place % LANES);
-        self.x[block][lane] = x;
-        self.y[block][lane] = y;
-        self.z[block][lane] = z;
-        self.index[block][lane] = index;
+    fn put(&mut self, place: usize, point: [f32; 3], index: u32) {
+        let (block, lane) = (&mut self.blocks[place / LANES], place % LANES);
+        for (values, value) in block.at.iter_mut().zip(point) {
+            values[lane] = value;
+        }
+        block.index[lane] = index;
     }
 
     /// Fills the last block with copies of the last point: as queries they find what it finds; candidates they are not.
     fn fill_up(&mut self) {
         let Some(last) = self.count.checked_sub(1) else { return };
         let (block, lane) = (last / LANES, last % LANES);
-        let point = [self.x[block][lane], self.y[block][lane], self.z[block][lane]];
+        let Block { at, index } = self.blocks[block];
         for place in self.count..(block + 1) * LANES {
-            self.put(place, point, self.index[block][lane]);
+            self.put(place, at.map(|values| values[lane]), index[lane]);
         }
     }
 
@@ -131,7 +135,7 @@ impl Blocks {
         for row in 0..rows {
             let mut boxes = NOWHERE;
             for block in row * ROW..blocks.min((row + 1) * ROW) {
-                for (axis, values) in [&self.x[block], &self.y[block], &self.z[block]].into_iter().enumerate() {
+                for (axis, values) in self.blocks[block].at.iter().enumerate() {
                     (boxes.low[axis][block % ROW], boxes.high[axis][block % ROW]) = extremes(values, values);
                 }
             }
@@ -180,14 +184,15 @@ impl<const K: usize> WithSimd for Search<'_, K> {
 }
 
 /// A block of points and the nearest of each so far.
+#[repr(C, align(64))]
 struct Query<const K: usize> {
+    best: [[f64; LANES]; K],
     at: [Lanes; 3],
     index: [u32; LANES],
-    low: [f32; 3],
-    high: [f32; 3],
-    best: [[f64; LANES]; K],
     /// Squared distance beyond which a lane needs nothing more.
     enough: Lanes,
+    low: [f32; 3],
+    high: [f32; 3],
 }
 
 impl<const K: usize> Query<K> {
@@ -195,8 +200,8 @@ impl<const K: usize> Query<K> {
     fn new(blocks: &Blocks, block: usize) -> Self {
         let boxes = &blocks.boxes[block / ROW];
         Self {
-            at: [blocks.x[block], blocks.y[block], blocks.z[block]],
-            index: blocks.index[block],
+            at: blocks.blocks[block].at,
+            index: blocks.blocks[block].index,
             low: std::array::from_fn(|axis| boxes.low[axis][block % ROW]),
             high: std::array::from_fn(|axis| boxes.high[axis][block % ROW]),
             best: [[NONE; LANES]; K],
@@ -208,7 +213,7 @@ impl<const K: usize> Query<K> {
     #[inline(always)]
     fn visit_own(&mut self, blocks: &Blocks, block: usize) {
         for place in 0..blocks.held(block) {
-            let other = blocks.index[block][place];
+            let other = blocks.blocks[block].index[place];
             let distance2 = self.distances2(blocks, block, place);
             let mut candidate = [NONE; LANES];
             for lane in 0..LANES {
@@ -222,7 +227,7 @@ impl<const K: usize> Query<K> {
     #[inline(always)]
     fn visit(&mut self, blocks: &Blocks, block: usize) {
         for place in 0..blocks.held(block) {
-            let other = blocks.index[block][place];
+            let other = blocks.blocks[block].index[place];
             let distance2 = self.distances2(blocks, block, place);
             let mut near = false;
             for (distance2, enough) in distance2.iter().zip(&self.enough) {
@@ -238,17 +243,19 @@ impl<const K: usize> Query<K> {
     #[inline(always)]
     fn visit_near(&mut self, blocks: &Blocks, seen: std::ops::RangeInclusive<usize>) {
         let count = blocks.count.div_ceil(LANES);
+        let mut worst2 = self.worst2();
         for (group, of_rows) in blocks.rows[..count.div_ceil(ROW * ROW)].iter().enumerate() {
             let bounds = self.bounds2(of_rows);
             for (row, &bound) in (group * ROW..count.div_ceil(ROW)).zip(&bounds) {
-                if bound > self.worst2() {
+                if bound > worst2 {
                     continue;
                 }
                 let bounds = self.bounds2(&blocks.boxes[row]);
                 for (block, &bound) in (row * ROW..count).zip(&bounds) {
-                    if bound <= self.worst2() && !seen.contains(&block) && self.reaches(&blocks.boxes[row], block % ROW)
+                    if bound <= worst2 && !seen.contains(&block) && self.reaches(&blocks.boxes[row], block % ROW)
                     {
                         self.visit(blocks, block);
+                        worst2 = self.worst2();
                     }
                 }
             }
@@ -258,7 +265,7 @@ impl<const K: usize> Query<K> {
     /// Squared distances of the block's points from one candidate.
     #[inline(always)]
     fn distances2(&self, blocks: &Blocks, block: usize, place: usize) -> Lanes {
-        let [x, y, z] = [blocks.x[block][place], blocks.y[block][place], blocks.z[block][place]];
+        let [x, y, z] = std::array::from_fn(|axis| blocks.blocks[block].at[axis][place]);
         std::array::from_fn(|lane| {
             let (dx, dy, dz) = (self.at[0][lane] - x, self.at[1][lane] - y, self.at[2][lane] - z);
             (dx * dx + dy * dy) + dz * dz
@@ -299,7 +306,13 @@ impl<const K: usize> Query<K> {
 
     #[inline(always)]
     fn worst2(&self) -> f32 {
-        self.enough.iter().fold(0.0, |worst, &lane| if lane > worst { lane } else { worst })
+        let mut most = self.enough;
+        for half in [LANES / 2, LANES / 4, LANES / 8, LANES / 16] {
+            for lane in 0..half {
+                most[lane] = if most[lane] > most[lane + half] { most[lane] } else { most[lane + half] };
+            }
+        }
+        most[0]
     }
 
     /// Keeps the nearest `K` of each lane in order.

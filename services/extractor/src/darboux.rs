@@ -73,10 +73,14 @@ pub const fn joint_bin(alpha: usize, phi: usize, theta: usize) -> usize {
 #[inline(always)]
 fn sine_level(value: f32) -> u32 {
     const LAST: f32 = LEVELS as f32 - 1.0;
+    /// Added to a small number, it leaves the nearest whole number in the last bits: 2^23.
+    const WHOLE: f32 = 8_388_608.0;
     let steps = (value + 1.0) * (LEVELS as f32 / 2.0);
     let steps = if steps > 0.0 { steps } else { 0.0 };
-    // As a signed number first: the only one that older machines make side by side.
-    (if steps < LAST { steps } else { LAST }) as i32 as u32
+    let steps = if steps < LAST { steps } else { LAST };
+    // A cast would be done one number at a time.
+    let shifted = steps + WHOLE;
+    (shifted.to_bits() - WHOLE.to_bits()) - u32::from(shifted - WHOLE > steps)
 }
 
 /// Level of θ = atan2(sin, cos) in [−π, π] in steps of 30°, found by signs: an edge belongs to the level farther from

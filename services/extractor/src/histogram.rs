@@ -94,6 +94,7 @@ impl WithSimd for Add<'_> {
                 share[other as usize] += part;
             }
         }
+        let mut total = histogram.total;
         for first in (0..count).step_by(LANES) {
             let held = LANES.min(count - first);
             let (near, distance_m) = neighbours.of_range(first..first + held);
@@ -124,11 +125,12 @@ impl WithSimd for Add<'_> {
                     if bin < BINS {
                         histogram.weight[bin] += weight;
                         histogram.held[bin / 64] |= 1 << (bin % 64);
-                        histogram.total += weight;
+                        total += weight;
                     }
                 }
             }
         }
+        histogram.total = total;
     }
 }
 
