@@ -1,7 +1,7 @@
 use pulp::{Simd, WithSimd};
 
 use crate::Neighbours;
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes, Row};
 use crate::neighbours::MAX_OTHERS;
 
 /// Below this share of the largest possible value, the system of Eq. 4 is taken as singular. Returns on a straight line
@@ -33,76 +33,110 @@ impl WithSimd for Estimate<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { points, neighbours, normals } = self;
         let each = neighbours.each();
         for (group, (here, normals)) in points.chunks(LANES).zip(normals.chunks_mut(LANES)).enumerate() {
             let first = group * LANES;
             let (near, _) = neighbours.of_range(first..first + here.len());
-            let mut at = [Lanes::splat(0.0); 3];
-            let mut offsets = [[Lanes::splat(0.0); 3]; MAX_OTHERS];
-            for (lane, point) in here.iter().enumerate() {
-                for axis in 0..3 {
-                    at[axis].0[lane] = f64::from(point[axis]);
+            let (mut at, mut others) = (Group::default(), [Group::default(); MAX_OTHERS]);
+            for (lane, &point) in here.iter().enumerate() {
+                at.put(lane, point);
+                for (group, &other) in others.iter_mut().zip(&near[lane * each..]).take(each) {
+                    group.put(lane, points[other as usize]);
                 }
-                for (offset, &other) in offsets.iter_mut().zip(&near[lane * each..]).take(each) {
+            }
+            let mut found = Group::default();
+            for place in 0..Lanes::<S>::OF_ROW {
+                let here = at.get(simd, place);
+                let mut offsets = [[Lanes::splat(simd, 0.0); 3]; MAX_OTHERS];
+                for (offset, other) in offsets.iter_mut().zip(&others).take(each) {
+                    let there = other.get(simd, place);
                     for axis in 0..3 {
-                        offset[axis].0[lane] = f64::from(points[other as usize][axis]);
+                        // Relative to the point: its neighbours are near, so nothing is lost in the differences.
+                        offset[axis] = there[axis] - here[axis];
                     }
                 }
-            }
-            let offsets = &mut offsets[..each];
-            for offset in offsets.iter_mut() {
-                for axis in 0..3 {
-                    // Relative to the point: its neighbours are near, so nothing is lost in the differences.
-                    offset[axis] = offset[axis] - at[axis];
+                let normals = normals_at(simd, here, &offsets[..each]);
+                for (normal, row) in normals.into_iter().zip(&mut found.0) {
+                    normal.store(row, place);
                 }
             }
-            let found = normals_at(at, offsets);
             for (lane, normal) in normals.iter_mut().enumerate() {
-                *normal = std::array::from_fn(|axis| found[axis].0[lane] as f32);
+                *normal = [found.0[0].0[lane] as f32, found.0[1].0[lane] as f32, found.0[2].0[lane] as f32];
             }
         }
     }
 }
 
+/// Vectors side by side.
+#[derive(Clone, Copy, Default)]
+struct Group([Row<f64>; 3]);
+
+impl Group {
+    #[inline(always)]
+    fn put(&mut self, lane: usize, vector: [f32; 3]) {
+        for (row, value) in self.0.iter_mut().zip(vector) {
+            row.0[lane] = f64::from(value);
+        }
+    }
+
+    #[inline(always)]
+    fn get<S: Simd>(&self, simd: S, place: usize) -> [Lanes<S>; 3] {
+        let [x, y, z] = &self.0;
+        [Lanes::load(simd, x, place), Lanes::load(simd, y, place), Lanes::load(simd, z, place)]
+    }
+}
+
 /// The normals of points, each given with the offsets of its neighbours [m].
 #[inline(always)]
-fn normals_at(here: [Lanes; 3], offsets: &[[Lanes; 3]]) -> [Lanes; 3] {
-    let zero = [Lanes::splat(0.0); 3];
-    let mut sum = zero;
+fn normals_at<S: Simd>(simd: S, here: [Lanes<S>; 3], offsets: &[[Lanes<S>; 3]]) -> [Lanes<S>; 3] {
+    let splat = |value| Lanes::splat(simd, value);
+    let zero = [splat(0.0); 3];
+    let mut mean = zero;
     for offset in offsets {
-        sum = std::array::from_fn(|axis| sum[axis] + offset[axis]);
+        for axis in 0..3 {
+            mean[axis] = mean[axis] + offset[axis];
+        }
     }
-    let count = Lanes::splat(offsets.len() as f64 + 1.0);
-    let mean = sum.map(|sum| sum / count);
+    let count = splat(offsets.len() as f64 + 1.0);
+    let mut centre = here;
+    for axis in 0..3 {
+        mean[axis] = mean[axis] / count;
+        centre[axis] = here[axis] + mean[axis];
+    }
     let mut scatter = [zero[0]; 6]; // xx, xy, xz, yy, yz, zz
     for offset in std::iter::once(&zero).chain(offsets) {
-        let [x, y, z] = std::array::from_fn(|axis| offset[axis] - mean[axis]);
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        scatter = std::array::from_fn(|entry| scatter[entry] + products[entry]);
+        let [x, y, z] = [offset[0] - mean[0], offset[1] - mean[1], offset[2] - mean[2]];
+        for (sum, product) in scatter.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum = *sum + product;
+        }
     }
-    let centre = std::array::from_fn(|axis| here[axis] + mean[axis]);
-    let normal = times_adjugate(scatter, centre); // Eq. (4)
+    let mut normal = times_adjugate(scatter, centre); // Eq. (4)
 
+    let (one, none) = (splat(1.0), splat(0.0));
     let trace = scatter[0] + scatter[3] + scatter[5];
     let length = norm(normal);
-    let regular = length.greater(Lanes::splat(SINGULAR) * trace * trace * norm(centre));
-    let normal_length = length.is_normal();
-    let determined = std::array::from_fn(|lane| regular[lane] & normal_length[lane]);
+    let regular = (splat(SINGULAR) * trace * trace * norm(centre)).if_less(length, one, none);
+    let determined = length.if_normal(regular, none);
     // cᵀ adj(S) c is never negative but by rounding.
-    let sign = dot(normal, centre).map(|product| if product < 0.0 { -1.0 } else { 1.0 });
-    let range = norm(here);
-    let has_view = range.is_normal();
-    std::array::from_fn(|axis| {
-        let view = (here[axis] / range).or(has_view, Lanes::splat([0.0, 0.0, 1.0][axis]));
-        (sign * normal[axis] / length).or(determined, view)
-    })
+    let sign = dot(normal, centre).if_less(none, splat(-1.0), one);
+    for component in &mut normal {
+        *component = sign * *component / length;
+    }
+    if determined.any_less(one) {
+        let range = norm(here);
+        for (axis, up) in [0.0, 0.0, 1.0].into_iter().enumerate() {
+            let view = range.if_normal(here[axis] / range, splat(up));
+            normal[axis] = determined.if_less(one, view, normal[axis]);
+        }
+    }
+    normal
 }
 
 /// adj(S) c for a symmetric S, given as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
-fn times_adjugate([xx, xy, xz, yy, yz, zz]: [Lanes; 6], c: [Lanes; 3]) -> [Lanes; 3] {
+fn times_adjugate<S: Simd>([xx, xy, xz, yy, yz, zz]: [Lanes<S>; 6], c: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
     let a = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
     let b = [a[1], xx * zz - xz * xz, xy * xz - xx * yz];
     let d = [a[2], b[2], xx * yy - xy * xy];
@@ -110,11 +144,11 @@ fn times_adjugate([xx, xy, xz, yy, yz, zz]: [Lanes; 6], c: [Lanes; 3]) -> [Lanes
 }
 
 #[inline(always)]
-fn dot(a: [Lanes; 3], b: [Lanes; 3]) -> Lanes {
+fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-fn norm(v: [Lanes; 3]) -> Lanes {
+fn norm<S: Simd>(v: [Lanes<S>; 3]) -> Lanes<S> {
     dot(v, v).sqrt()
 }
