@@ -146,8 +146,7 @@ impl<S: Simd> Which<S> {
     /// Whether any is chosen.
     #[inline(always)]
     pub(crate) fn any(self) -> bool {
-        let chosen = self.choose(Wide::splat(self.simd, 1.0), Wide::splat(self.simd, 0.0));
-        self.simd.reduce_max_f64s(chosen.values) > 0.0
+        self.simd.first_true_m64s(self.lanes) < S::F64_LANES
     }
 }
 
