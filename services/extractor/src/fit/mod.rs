@@ -1,9 +1,10 @@
 //! The four solids fitted to the rays of a cluster: those that met it, and those that passed it by.
 //!
 //! A body is pose and size of a solid; its residuals are what the sensor would have measured on it less what it did measure
-//! ([`residuals`]). Each solid knows, in a file of its own, where a ray meets it and how a ray passes it; the
-//! derivatives are the same for all ([`solid`]). [`Fitter`] looks for the best body of each solid: from several starts
-//! ([`frames`], [`start`]) by Levenberg's and Marquardt's method ([`descent`]), on a budget ([`budget`]).
+//! ([`residuals`]), ray by ray ([`sight`]) but many at once ([`wide`]). Each solid knows, in a file of its own, where a ray
+//! meets it and how a ray passes it; the derivatives are the same for all ([`solid`]). [`Fitter`] looks for the best body of
+//! each solid: from several starts ([`frames`], [`start`]) by Levenberg's and Marquardt's method ([`descent`]), on a budget
+//! ([`budget`]).
 
 mod budget;
 mod cone;

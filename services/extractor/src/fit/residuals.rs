@@ -20,6 +20,7 @@ pub(crate) enum Measure {
 /// What a body is fitted to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rays<'a> {
+    /// The instructions that rays are measured with; they change no bit.
     pub(crate) arch: Arch,
     pub(crate) hits: &'a Beam,
     pub(crate) misses: &'a Beam,
