@@ -73,6 +73,7 @@ struct Span {
 
 /// What is not in rows; 0 where a class has no more support vectors.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 struct Tile {
     norm2: [f32; TILE],
     /// Against each other class: libsvm's `sv_coef`.
@@ -92,21 +93,21 @@ pub(crate) struct Query {
     dense: usize,
     sparse: usize,
     /// x·s for each support vector of a span, of rare bins alone.
-    rare: [[f32; TILE]; TILES],
+    rare: Aligned<[[f32; TILE]; TILES]>,
     /// The sums, in parts that are added side by side.
-    lanes: [[[f64; LANES]; MAX_CLASSES - 1]; MAX_CLASSES],
+    lanes: Aligned<[[[f64; LANES]; MAX_CLASSES - 1]; MAX_CLASSES]>,
 }
 
 impl Query {
     pub(crate) const fn new() -> Self {
-        let lanes = [[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES];
-        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, rare: [[0.0; TILE]; TILES], lanes }
+        let lanes = Aligned([[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES]);
+        Self { norm2: 0.0, rows: [(0, 0.0); BINS], dense: 0, sparse: BINS, rare: Aligned([[0.0; TILE]; TILES]), lanes }
     }
 
     /// Takes a descriptor: bins in order of index, each index under 1728 and given once.
     pub(crate) fn set(&mut self, kernels: &Kernels, bins: &[Bin]) {
         (self.dense, self.sparse) = (0, BINS);
-        self.lanes = [[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES];
+        self.lanes.0 = [[[0.0; LANES]; MAX_CLASSES - 1]; MAX_CLASSES];
         for bin in bins {
             match kernels.row_of_bin[bin.index as usize] {
                 Row::Unused => {}
@@ -125,13 +126,13 @@ impl Query {
 
     /// The sums that [`Kernels::sum`] has made.
     pub(crate) fn sums(&self) -> Sums {
-        Sums(self.lanes.map(|of_class| of_class.map(|lanes| lanes.iter().sum())))
+        Sums(self.lanes.0.map(|of_class| of_class.map(|lanes| lanes.iter().sum())))
     }
 
     /// Makes `rare` for a span, given its lists.
     #[inline(always)]
     fn add_rare(&mut self, lists: &[u32], sparse: &[(u32, f32)]) {
-        let rare = self.rare.as_flattened_mut();
+        let rare = self.rare.0.as_flattened_mut();
         rare.fill(0.0);
         for &(row, weight) in &self.rows[self.sparse..] {
             let list = lists[row as usize] as usize..lists[row as usize + 1] as usize;
@@ -234,14 +235,14 @@ impl WithSimd for Sum<'_> {
             for (place, tile) in span.tiles.iter().enumerate() {
                 let dense = &kernels.dense[span.first_row + place * kernels.dense_rows..][..kernels.dense_rows];
                 for query in &mut *queries {
-                    let mut kernel = query.rare[place];
-                    add_products(simd, &mut kernel, dense, &query.rows[..query.dense]);
-                    for (product, of_vector) in kernel.iter_mut().zip(&tile.norm2) {
+                    let mut kernel = Aligned(query.rare.0[place]);
+                    add_products(simd, &mut kernel.0, dense, &query.rows[..query.dense]);
+                    for (product, of_vector) in kernel.0.iter_mut().zip(&tile.norm2) {
                         let distance2 = query.norm2 + of_vector - 2.0 * *product;
                         *product = exp_of_negative(-kernels.gamma * if distance2 > 0.0 { distance2 } else { 0.0 });
                     }
-                    let sums = &mut query.lanes[span.class];
-                    add_weighted(simd, sums, &kernel, &tile.coefficients);
+                    let sums = &mut query.lanes.0[span.class];
+                    add_weighted(simd, sums, &kernel.0, &tile.coefficients);
                 }
             }
         }
@@ -288,11 +289,11 @@ fn add_weighted<S: Simd>(
     kernel: &[f32; TILE],
     coefficients: &[[f64; TILE]; MAX_CLASSES - 1],
 ) {
-    let mut wide = [0.0; TILE];
-    for (wide, &value) in wide.iter_mut().zip(kernel) {
+    let mut wide = Aligned([0.0; TILE]);
+    for (wide, &value) in wide.0.iter_mut().zip(kernel) {
         *wide = f64::from(value);
     }
-    let (kernel, _) = S::as_simd_f64s(&wide);
+    let (kernel, _) = S::as_simd_f64s(&wide.0);
     for (sums, coefficients) in sums.iter_mut().zip(coefficients) {
         let (sums, _) = S::as_mut_simd_f64s(sums);
         let (coefficients, _) = S::as_simd_f64s(coefficients);

@@ -136,6 +136,7 @@ impl WithSimd for Add<'_> {
 
 /// Vectors side by side.
 #[derive(Default)]
+#[repr(align(64))]
 struct Group([[f32; LANES]; 3]);
 
 impl Group {
