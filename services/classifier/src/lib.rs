@@ -30,6 +30,7 @@ mod room;
 mod solid_features;
 mod svm;
 mod svm_file;
+mod tile;
 
 pub use boosted_trees::{
     BoostedTrees, BoostedTreesError, MAX_FEATURES, MAX_NODES, MAX_ROUNDS, MAX_TEMPERATURE, MIN_TEMPERATURE, TreeError,

@@ -24,6 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod block_query;
 mod blocks;
 mod darboux;
 mod features;
