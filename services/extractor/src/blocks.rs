@@ -174,6 +174,9 @@ impl<const K: usize> WithSimd for Search<'_, K> {
             }
             query.write(blocks, block, found);
         }
+        for distance in &mut found.distance_m[..blocks.count * found.each] {
+            *distance = distance.sqrt();
+        }
     }
 }
 
