@@ -34,7 +34,7 @@ pub(super) fn bill(chain: &Chain) -> Vec<HopBill> {
     let of_source = [(SOURCE, "Sweep"), (SOURCE, "Truth")].into_iter();
     let of_stages = chain.stages.iter().filter_map(|stage| Some((stage.name.as_str(), stage.writes.as_deref()?)));
     let bills = of_source.chain(of_stages).filter_map(|(writer, message)| {
-        let segment = segment_of(message, chain.queue_parts)?;
+        let segment = segment_of(message, chain.queue_parts())?;
         Some(HopBill {
             writer: writer.to_owned(),
             message: message.to_owned(),

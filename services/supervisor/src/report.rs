@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
+use crate::overload::OverloadReport;
 use crate::processes::ProcessReport;
 
 /// Everything that is known of a run, as `--report` writes it.
@@ -40,6 +41,8 @@ pub struct Report {
     pub seam_latency_ms: Percentiles,
     /// Misses and what caused them.
     pub deadline: DeadlineReport,
+    /// Overruns, slips, and what was left out under overload.
+    pub overload: OverloadReport,
     /// The sweeps that took longest, longest first, each with the way of its last part.
     pub worst_sweeps: Vec<WorstSweep>,
     /// Sweeps that were answered, by the step of degradation at which they were processed.
@@ -132,6 +135,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) published: u64,
     pub(crate) duration_s: f64,
     pub(crate) processes: Vec<ProcessReport>,
+    pub(crate) overload: OverloadReport,
     pub(crate) machine_load: MachineLoad,
     pub(crate) noise_ms: Percentiles,
     pub(crate) realtime_refused: Vec<String>,
@@ -140,7 +144,7 @@ pub(crate) struct Facts<'a> {
 
 impl Report {
     pub(crate) fn of(facts: Facts<'_>) -> Self {
-        let Facts { plan, snapshot, ledger, published, duration_s, processes, stopped, .. } = facts;
+        let Facts { plan, snapshot, ledger, published, duration_s, processes, overload, stopped, .. } = facts;
         let stages = snapshot.stages.iter().map(|stage| {
             let latency = StageLatency {
                 transport: stage.transport.percentiles(),

@@ -1,6 +1,7 @@
 use messages::MAX_HOPS;
 use serde::{Deserialize, Serialize};
 
+use crate::overload::Overload;
 use crate::{ChainFile, Realtime, SourceFile};
 
 /// What the source writes.
@@ -78,6 +79,33 @@ pub enum ChainError {
         /// What it must be.
         expected: &'static str,
     },
+    /// Budgets that leave no time for the way between the stages.
+    #[error("the budgets add up to {sum_ms} ms, must be at most deadline_ms = {deadline_ms}")]
+    Budgets {
+        /// Their sum [ms].
+        sum_ms: f64,
+        /// The deadline [ms].
+        deadline_ms: f64,
+    },
+    /// An answer in time that nobody may act on.
+    #[error("deadline_ms is {deadline_ms}, must be at most allowed_age_ms = {allowed_age_ms}")]
+    Age {
+        /// The deadline [ms].
+        deadline_ms: f64,
+        /// The allowed age [ms].
+        allowed_age_ms: f64,
+    },
+    /// A stage that is waited for and may take for ever.
+    #[error("stage {0:?} has no budget_ms, must have one: only the last stage has none")]
+    NoBudget(String),
+    /// A step of overload that there is none of.
+    #[error(
+        "overload.steps names {0:?}, must name \"fewer-starts\", \"paper-features\", \"clusters-only\" or \"every-second-sweep\""
+    )]
+    Step(String),
+    /// Steps of overload out of order.
+    #[error("overload.steps has {0:?} after a later step, must go from the gentlest to the last, each once")]
+    StepOrder(String),
     /// A real-time setting outside its bounds.
     #[error("{process}: realtime.{key} is {value}, must be {expected}")]
     Realtime {

@@ -18,6 +18,8 @@ pub struct ChainFile {
     pub restarts: u32,
     /// Length of that window [s].
     pub restart_window_s: f64,
+    /// What is left out under overload.
+    pub overload: OverloadFile,
     /// What is asked of the kernel; without the table nothing is.
     pub realtime: Option<RealtimeFile>,
     /// Where sweeps come from when `--from` says nothing else.
@@ -51,6 +53,22 @@ pub struct StageFile {
     pub writes: Option<String>,
     /// Its parameters, relative to chain.toml; none where it has none.
     pub parameters: Option<String>,
+    /// Time that it may be busy with a sweep [ms]; none for the sink, which the chain does not wait for.
+    pub budget_ms: Option<f64>,
     /// Where its process runs; without it wherever the kernel puts it.
     pub realtime: Option<SeatFile>,
+}
+
+/// The ladder of overload as written.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverloadFile {
+    /// Names of the steps that are taken, gentlest first; empty: overruns are only counted.
+    pub steps: Vec<String>,
+    /// Sweeps in trouble, of the last `within_sweeps`, after which a step is taken.
+    pub troubled_sweeps: u32,
+    /// Sweeps looked back on.
+    pub within_sweeps: u32,
+    /// Sweeps without trouble after which a step is taken back.
+    pub recover_sweeps: u32,
 }

@@ -5,8 +5,10 @@
 
 mod check;
 mod file;
+mod overload;
 mod realtime;
 
 pub use check::{Chain, ChainError, RestartBudget, Wired};
-pub use file::{ChainFile, SourceFile, StageFile};
+pub use file::{ChainFile, OverloadFile, SourceFile, StageFile};
+pub use overload::Overload;
 pub use realtime::{Realtime, RealtimeFile, SUPERVISOR, Seat, SeatFile};

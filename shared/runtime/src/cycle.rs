@@ -4,6 +4,7 @@ use transport::{Outlet, Taken};
 
 use crate::deadline::Deadline;
 use crate::reader::{Arrivals, Reader, serve};
+use crate::run_delay::Laps;
 use crate::shell::WARM_UP_PARTS;
 use crate::{Shell, ShellError, clock};
 
@@ -25,18 +26,21 @@ struct Cycle<'a, S: Stage> {
     outlet: Outlet<S::Output>,
     arrivals: Arrivals<'a>,
     deadline: Deadline,
+    taken_by_others: Laps,
 }
 
 impl<'a, S: Stage> Cycle<'a, S> {
     fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>) -> Self {
-        Self { stage, shell, outlet, arrivals: Arrivals::new(shell), deadline: Deadline::of(&shell.plan, &shell.name) }
+        let deadline = Deadline::of(&shell.plan, &shell.name);
+        let taken_by_others = Laps::of_this_thread();
+        Self { stage, shell, outlet, arrivals: Arrivals::new(shell), deadline, taken_by_others }
     }
 }
 
 impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
     /// One part: receive → in hand → process → send → published → counted → out of hand → release.
     fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
-        let Self { stage, shell, outlet, arrivals, deadline } = self;
+        let Self { stage, shell, outlet, arrivals, deadline, taken_by_others } = self;
         let page = &shell.page;
         let received_ns = clock::now_ns();
         let mut trace: Trace = *taken.trace();
@@ -46,6 +50,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
 
         let before_shell = (shell.allocations)();
         let mut loan = outlet.loan()?;
+        let taken_before_ns = taken_by_others.lap_ns();
         let started_ns = clock::now_ns();
         let before_process = (shell.allocations)();
         let verdict = if deadline.is_stale(&trace, started_ns) {
@@ -56,6 +61,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         let in_process = (shell.allocations)() - before_process;
         shell.slow_down(trace.part);
         let finished_ns = clock::now_ns();
+        let taken_busy_ns = taken_by_others.lap_ns();
 
         page.note_verdict(verdict);
         let hop = Hop {
@@ -64,8 +70,8 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             received_ns,
             started_ns,
             finished_ns,
-            taken_before_ns: 0,
-            taken_busy_ns: 0,
+            taken_before_ns,
+            taken_busy_ns,
             incarnation: shell.incarnation,
             stage: shell.position,
             verdict,

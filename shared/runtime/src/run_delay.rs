@@ -37,6 +37,27 @@ impl RunDelay {
     }
 }
 
+/// The same from lap to lap.
+pub(crate) struct Laps {
+    delay: RunDelay,
+    seen_ns: u64,
+}
+
+impl Laps {
+    pub(crate) fn of_this_thread() -> Self {
+        let delay = RunDelay::of_this_thread();
+        Self { seen_ns: delay.total_ns().unwrap_or(0), delay }
+    }
+
+    /// Time since the last lap in which another thread had the core [ns]; 0 where the kernel does not count it.
+    pub(crate) fn lap_ns(&mut self) -> u32 {
+        let now_ns = self.delay.total_ns().unwrap_or(self.seen_ns);
+        let lap_ns = now_ns.saturating_sub(self.seen_ns);
+        self.seen_ns = now_ns;
+        u32::try_from(lap_ns).unwrap_or(u32::MAX)
+    }
+}
+
 /// `RUNNING_NS WAITING_NS SLICES`
 fn parse(text: &[u8]) -> Option<[u64; 3]> {
     let mut numbers = std::str::from_utf8(text).ok()?.split_ascii_whitespace().map(str::parse);

@@ -56,7 +56,7 @@ impl LockPlan {
     pub fn foreseen(chain: &Chain, process: &str) -> Self {
         let stage = chain.stages.iter().find(|stage| stage.name == process);
         let bytes_of =
-            |message: &str| segment_of(message, chain.queue_parts).map_or(0, |segment| segment.virtual_bytes());
+            |message: &str| segment_of(message, chain.queue_parts()).map_or(0, |segment| segment.virtual_bytes());
         let written = match stage {
             Some(stage) => stage.writes.as_deref().map_or(0, bytes_of),
             None if process == crate::SOURCE => bytes_of("Sweep") + bytes_of("Truth"),
@@ -69,7 +69,7 @@ impl LockPlan {
     /// What a reader maps: its writer's segment, and that of the writer's successor before the old one is let go.
     fn to_be_mapped(chain: &Chain, process: &str) -> u64 {
         let stage = chain.stages.iter().find(|stage| stage.name == process);
-        let segment = stage.and_then(|stage| segment_of(&stage.reads, chain.queue_parts));
+        let segment = stage.and_then(|stage| segment_of(&stage.reads, chain.queue_parts()));
         segment.map_or(0, |segment| 2 * segment.virtual_bytes())
     }
 
