@@ -5,6 +5,7 @@ use zerocopy::FromZeros;
 
 use crate::pacer::Pacer;
 use crate::page::State;
+use crate::run_delay::Laps;
 use crate::window::Window;
 use crate::{Pace, Shell, ShellError, clock};
 
@@ -72,6 +73,7 @@ struct Out<'a> {
     step: u32,
     trace: Trace,
     free_ns: u64,
+    taken_by_others: Laps,
 }
 
 impl<'a> Out<'a> {
@@ -88,6 +90,7 @@ impl<'a> Out<'a> {
             step: 0,
             trace: Trace::default(),
             free_ns: clock::now_ns(),
+            taken_by_others: Laps::of_this_thread(),
         })
     }
 
@@ -131,6 +134,8 @@ impl<'a> Out<'a> {
             Pace::Fast => clock::now_ns(),
             Pace::Realtime => self.start_ns + self.cutter.end_offset_ns(&self.whole, sector),
         };
+        // What was taken while it was made is the sweep's own time; only its time to leave counts.
+        self.taken_by_others.lap_ns();
         self.wait_until(due_ns, || sector == 0 && shell.leaving());
         if clock::now_ns() < due_ns {
             shell.page.put_down();
@@ -150,7 +155,8 @@ impl<'a> Out<'a> {
             reserved: 0,
         };
         self.trace = Trace { part, due_ns, sweep_start_ns: self.start_ns, ..Trace::default() };
-        self.trace.push(self.hop(received_ns, started_ns));
+        let taken_busy_ns = self.taken_by_others.lap_ns();
+        self.trace.push(Hop { taken_busy_ns, ..self.hop(received_ns, started_ns) });
         self.publish(loan)?;
         Ok(true)
     }
