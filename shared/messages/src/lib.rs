@@ -17,6 +17,8 @@ mod clusters;
 mod descriptors;
 mod detections;
 mod header;
+mod joiner;
+mod raw;
 mod sectors;
 mod solids;
 mod step;
@@ -29,6 +31,8 @@ pub use clusters::{Cell, CellKind, Cluster, ClusterSummary, Clusters, MAX_CELLS,
 pub use descriptors::{Bin, Descriptor, Descriptors, MAX_BINS, MIN_FEATURE_POINTS};
 pub use detections::{Detection, Detections};
 pub use header::{Refusal, SweepHeader};
+pub use joiner::Joiner;
+pub use raw::{Raw, RawError};
 pub use sectors::Cutter;
 pub use solids::{Fit, MAX_FITS, RELIEF, SOLID_PARAMETERS, Solid, SolidFit};
 pub use step::Step;

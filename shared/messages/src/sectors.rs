@@ -219,6 +219,34 @@ mod tests {
     }
 
     #[test]
+    fn sectors_in_order_join_to_the_sweep_again_and_a_gap_leaves_it_out() {
+        use crate::{Joiner, Part, Raw};
+        let bytes = |sweep: &Sweep| {
+            let mut bytes = Vec::new();
+            sweep.write_raw(&mut bytes);
+            bytes
+        };
+        let part = |sweep, sector, sectors| Part { sweep, sector, sectors, ..Part::default() };
+        let mut sut = Joiner::new().unwrap();
+        for sectors in [1, 3, 100] {
+            let mut whole = turn();
+            Cutter::new(sectors).measure(&mut whole);
+            let pieces = pieces(&whole, sectors);
+            // Half a sweep, then the same from its beginning: the second copy counts.
+            for sector in (0..sectors / 2).chain(0..sectors) {
+                let joined = sut.add(&part(4, sector, sectors), &pieces[sector as usize]);
+                assert_eq!(joined.map(bytes), (sector + 1 == sectors).then(|| bytes(&whole)), "{sector} of {sectors}");
+            }
+            for missing in 0..sectors {
+                let rest = (0..sectors).filter(|&sector| sector != missing);
+                let mut joined =
+                    rest.map(|sector| sut.add(&part(5, sector, sectors), &pieces[sector as usize]).is_some());
+                assert!(!joined.any(|joined| joined), "{missing} of {sectors}");
+            }
+        }
+    }
+
+    #[test]
     fn sectors_end_when_the_next_ones_first_column_fires_and_the_last_with_the_turn() {
         let whole = turn();
         let ends: Vec<u64> = (0..4).map(|sector| Cutter::new(4).end_offset_ns(&whole, sector)).collect();

@@ -1,0 +1,1 @@
+//! A recording as one self-contained web page.
