@@ -57,7 +57,7 @@ pub(crate) fn open(plan: &SourcePlan, assets: &Assets) -> Result<Opened, Failure
         min_range_m: plan.min_range_m,
         max_range_m: plan.max_range_m,
         repeat: plan.repeat,
-        both_returns: false,
+        ..Options::default()
     };
     let lookup = |name: &str| sensor(name, assets).map_err(Into::into);
     let recording = replay::open(&plan.from, &options, &lookup).map_err(Failure::start)?;

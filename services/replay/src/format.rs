@@ -1,7 +1,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::{capture, cloud};
+use crate::{capture, cloud, mcap};
 
 /// A format of recorded data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,11 +15,17 @@ pub enum Format {
     Pcd,
     /// nuScenes `LIDAR_TOP`: five floats a return, one sweep a file.
     NuScenes,
+    /// Polygon file format, one sweep a file.
+    Ply,
+    /// KITTI: four floats a return, one sweep a file.
+    Kitti,
+    /// Messages of Encke and of others in one container.
+    Mcap,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 4] = [Self::Pcap, Self::Csv, Self::Pcd, Self::NuScenes];
+    pub const ALL: [Self; 7] = [Self::Pcap, Self::Csv, Self::Pcd, Self::NuScenes, Self::Ply, Self::Kitti, Self::Mcap];
 
     /// The format's word on the command line and in reports.
     pub const fn name(self) -> &'static str {
@@ -28,6 +34,9 @@ impl Format {
             Self::Csv => "csv",
             Self::Pcd => "pcd",
             Self::NuScenes => "nuscenes",
+            Self::Ply => "ply",
+            Self::Kitti => "kitti",
+            Self::Mcap => "mcap",
         }
     }
 
@@ -36,12 +45,18 @@ impl Format {
         // Those with a mark of their own come first.
         if capture::is_capture(head) {
             Some(Self::Pcap)
+        } else if mcap::is_mcap(head) {
+            Some(Self::Mcap)
+        } else if cloud::ply::is_ply(head) {
+            Some(Self::Ply)
         } else if cloud::pcd::is_pcd(head) {
             Some(Self::Pcd)
         } else if cloud::csv::is_csv(head) {
             Some(Self::Csv)
         } else if cloud::nuscenes::is_nuscenes(head) {
             Some(Self::NuScenes)
+        } else if cloud::kitti::is_kitti(head) {
+            Some(Self::Kitti)
         } else {
             None
         }
@@ -50,6 +65,12 @@ impl Format {
     /// The names of all, for a message.
     pub(crate) fn list() -> String {
         Self::ALL.map(Self::name).join(", ")
+    }
+
+    /// Name of the sensor model where the caller does not give one: KITTI's sensor is known, the others are taken for
+    /// the HDL-32E.
+    pub(crate) fn sensor(self) -> &'static str {
+        if self == Self::Kitti { "hdl-64e" } else { "hdl-32e" }
     }
 
     /// Nearest range accepted where the caller does not say [m]: nuScenes keeps firings without a return, and returns
@@ -87,6 +108,8 @@ mod tests {
         for format in Format::ALL {
             assert_eq!(format.name().parse(), Ok(format));
         }
-        assert!("las".parse::<Format>().unwrap_err().to_string().contains("pcap, csv, pcd, nuscenes"));
+        assert!(
+            "las".parse::<Format>().unwrap_err().to_string().contains("pcap, csv, pcd, nuscenes, ply, kitti, mcap")
+        );
     }
 }

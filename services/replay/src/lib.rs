@@ -18,6 +18,7 @@ mod faults;
 mod files;
 mod format;
 mod intake;
+mod mcap;
 mod recording;
 mod table;
 mod time;

@@ -13,16 +13,15 @@ use crate::format::Format;
 use crate::intake::Limits;
 use crate::velodyne::{Sweeps, check_rate};
 
-/// The sensor of every format that does not say it, where the caller does not either.
-const DEFAULT_SENSOR: &str = "hdl-32e";
-
 /// What the caller may say of a recording. Everything else is found in it.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The format, where its content does not tell or a folder holds several.
     pub format: Option<Format>,
-    /// Name of the sensor model; `hdl-32e` if none.
+    /// Name of the sensor model; if none, `hdl-64e` for KITTI and `hdl-32e` elsewhere.
     pub sensor: Option<String>,
+    /// The topic of an MCAP file to read, where it has several that hold sweeps.
+    pub topic: Option<String>,
     /// Nearest accepted range [m]; the sensor model's if none, 1 m for nuScenes.
     pub min_range_m: Option<f64>,
     /// Farthest accepted range [m]; the sensor model's if none.
@@ -63,7 +62,7 @@ enum Reader {
 pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result<Recording, ReplayError> {
     let mut faults = Faults::default();
     let (files, format) = files::find(path, options.format, &mut faults)?;
-    let name = options.sensor.as_deref().unwrap_or(DEFAULT_SENSOR);
+    let name = options.sensor.as_deref().unwrap_or(format.sensor());
     let sensor = sensors(name).map_err(|source| ReplayError::Sensor { name: name.to_owned(), source })?;
     let [near_m, far_m] = sensor.accepted_range_m();
     let near_m = options.min_range_m.or(format.near_m()).unwrap_or(near_m);
@@ -74,7 +73,7 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
             let sweeps = Sweeps::new(Capture::new(files), &sensor, limits, options.both_returns)?;
             Reader::Packets(Box::new(sweeps))
         }
-        Format::Csv | Format::Pcd | Format::NuScenes => {
+        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti | Format::Mcap => {
             Reader::Clouds(Box::new(Clouds::new(files, format, &sensor, limits, &mut faults)?))
         }
     };

@@ -6,7 +6,7 @@ use lidar::{Column, Return, SensorModel};
 use messages::{Refusal, Sweep};
 
 use super::organise::Organiser;
-use super::{Cloud, csv, nuscenes, pcd};
+use super::{Cloud, csv, kitti, nuscenes, pcd, ply};
 use crate::error::{Place, ReplayError};
 use crate::faults::{Fault, Faults};
 use crate::format::Format;
@@ -104,7 +104,9 @@ impl Clouds {
             let read = match self.format {
                 Format::Csv => csv::read(path, &mut self.ahead, &mut self.line, faults),
                 Format::Pcd => pcd::read(path, &mut self.ahead, &mut self.memory, faults),
-                Format::NuScenes | Format::Pcap => nuscenes::read(path, &mut self.ahead, faults),
+                Format::Ply => ply::read(path, &mut self.ahead, &mut self.line, faults),
+                Format::Kitti => kitti::read(path, &mut self.ahead, faults),
+                Format::NuScenes | Format::Pcap | Format::Mcap => nuscenes::read(path, &mut self.ahead, faults),
             };
             match read {
                 Ok(()) => self.is_ahead = true,

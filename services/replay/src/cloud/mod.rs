@@ -2,10 +2,12 @@
 
 pub(crate) mod csv;
 pub(crate) mod files;
+pub(crate) mod kitti;
 mod lzf;
 pub(crate) mod nuscenes;
 mod organise;
 pub(crate) mod pcd;
+pub(crate) mod ply;
 
 /// Points kept of one file. Four times what a sweep holds: those refused count, those beyond are over capacity anyway.
 const MAX_POINTS: usize = 4 * lidar::MAX_RETURNS;
