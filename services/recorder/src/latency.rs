@@ -89,6 +89,25 @@ impl LatencySnapshot {
         self.values_ns.last().map(|&[value, _]| value)
     }
 
+    /// The distribution in at most a few hundred points, closer towards its end: value [ns], and how many values are not
+    /// beyond it. The last one is the longest of all.
+    ///
+    /// A point is given where the share of longer ones has become 10 % less than at the point before.
+    pub fn points(&self) -> Vec<[u64; 2]> {
+        let all = self.count();
+        let (mut seen, mut next_beyond) = (0, all as f64);
+        let mut points = Vec::new();
+        for &[value, count] in &self.values_ns {
+            seen += count;
+            let beyond = (all - seen) as f64;
+            if beyond <= next_beyond {
+                points.push([value, seen]);
+                next_beyond = 0.9 * beyond;
+            }
+        }
+        points
+    }
+
     /// What reports show.
     pub fn percentiles(&self) -> Percentiles {
         let ms = |quantile| self.quantile_ns(quantile).map(|ns| ns as f64 / 1e6);

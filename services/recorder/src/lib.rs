@@ -41,6 +41,7 @@
 
 mod answers;
 mod assemble;
+mod buckets;
 mod cause;
 mod detections_json;
 mod history;
@@ -57,14 +58,17 @@ mod snapshot;
 mod stage_stats;
 mod stats;
 mod sweeps;
+mod timeline;
 mod trace_events;
 mod trace_file;
 mod worst;
 mod writer;
 
 pub use answers::Answered;
+pub use buckets::{Buckets, Merge};
 pub use latency::{LatencySnapshot, Percentiles};
 pub use recorder::Recorder;
 pub use settings::{MAX_QUEUE_PARTS, RecorderError, Settings};
 pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, TraceCounts, VERSION};
+pub use timeline::{BucketSnapshot, TimelineSnapshot};
 pub use worst::{WorstHop, WorstSweep};

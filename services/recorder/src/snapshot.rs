@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 use crate::answers::{self, Answered};
 use crate::latency::LatencySnapshot;
 use crate::stage_stats::Verdicts;
+use crate::timeline::TimelineSnapshot;
 use crate::worst::{WorstSweep, merge};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// The recorder's statistics at one moment: of one life of its process, or merged, of several.
 ///
@@ -72,6 +73,8 @@ pub struct Snapshot {
     pub worst: Vec<WorstSweep>,
     /// Deadline misses; paced sources only.
     pub deadline: Deadline,
+    /// How all this went over time.
+    pub timeline: TimelineSnapshot,
     /// The stages in chain order, the source first.
     pub stages: Vec<StageSnapshot>,
     /// What became of the trace file's events; none where no such file is written.
@@ -212,10 +215,12 @@ impl Snapshot {
             return Err(SnapshotError::Stages(names(self), names(later)));
         }
         self.parts += later.parts;
+        let mut missing_between = 0;
         self.sweeps += later.sweeps;
         if let (Some(last), Some(first)) = (self.last_sweep, later.first_sweep) {
             self.sweeps -= u64::from(first == last);
-            self.missing_sweeps += first.saturating_sub(last.saturating_add(1));
+            missing_between = first.saturating_sub(last.saturating_add(1));
+            self.missing_sweeps += missing_between;
         }
         if let (Some(last), Some(first)) = (self.last_ordinal, later.first_ordinal) {
             self.missing_parts += first.saturating_sub(last.saturating_add(1));
@@ -244,6 +249,7 @@ impl Snapshot {
         self.obstacle.merge(&later.obstacle);
         self.seam.merge(&later.seam);
         merge(&mut self.worst, &later.worst);
+        self.timeline.merge(&later.timeline, missing_between, self.stages.len());
         self.deadline.misses += later.deadline.misses;
         add(&mut self.deadline.causes, &later.deadline.causes);
         for (stage, later) in self.stages.iter_mut().zip(&later.stages) {

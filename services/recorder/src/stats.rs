@@ -12,6 +12,7 @@ use crate::settings::Settings;
 use crate::snapshot::{Snapshot, count, count_verdicts};
 use crate::stage_stats::{StageStatistics, Verdicts};
 use crate::sweeps::{Ending, Rejection, Sweeps};
+use crate::timeline::{Counts, Timeline};
 use crate::worst::Worst;
 
 /// Statistics of one life of the recorder.
@@ -27,6 +28,7 @@ pub(crate) struct Statistics {
     obstacle: Latency,
     seam: Latency,
     worst: Worst,
+    timeline: Timeline,
     judge: Judge,
     misses: u64,
     /// Sweeps without an answer because the recorder found a part of them malformed.
@@ -65,6 +67,7 @@ impl Statistics {
             obstacle: Latency::new()?,
             seam: Latency::new()?,
             worst: Worst::default(),
+            timeline: Timeline::new(),
             judge: Judge::new(),
             misses: 0,
             malformed_sweeps: 0,
@@ -80,6 +83,19 @@ impl Statistics {
 
     /// Adds a part; `verdict` is what the recorder made of it. Its sweep's answer, if it is with this part.
     pub(crate) fn add(&mut self, trace: &Trace, input: &Detections, verdict: Verdict) -> Option<Answer> {
+        let segments = Segments::of(trace);
+        let before = self.counts();
+        let answer = self.add_part(trace, input, verdict, &segments);
+        let at_ns = trace.hops().last().map_or(trace.due_ns, |hop| hop.finished_ns);
+        self.timeline.note(at_ns, &before, &self.counts(), answer.map(|_| &segments));
+        answer
+    }
+
+    fn counts(&self) -> Counts {
+        Counts { misses: self.misses, missing: self.sweeps.missing, detections: self.detections }
+    }
+
+    fn add_part(&mut self, trace: &Trace, input: &Detections, verdict: Verdict, segments: &Segments) -> Option<Answer> {
         self.parts += 1;
         self.verdicts[verdict as usize] += 1;
         let malformed = verdict == Verdict::RejectedMalformed;
@@ -92,7 +108,6 @@ impl Statistics {
         if !malformed {
             self.add_rows(trace, input);
         }
-        let segments = Segments::of(trace);
         if segments.hop_count == 0 {
             return None;
         }
@@ -101,14 +116,14 @@ impl Statistics {
         }
         self.source_late.record(segments.source_late_ns);
         let answer = match ending {
-            Some(Ending::Answered) => Some(self.add_answer(trace, &segments)),
+            Some(Ending::Answered) => Some(self.add_answer(trace, segments)),
             Some(Ending::Rejected(rejection)) => {
                 self.add_rejected(rejection);
                 None
             }
             None => None,
         };
-        self.judge.note(trace, &segments);
+        self.judge.note(trace, segments);
         answer
     }
 
@@ -194,6 +209,7 @@ impl Statistics {
         for (from, to) in self.stages.iter().zip(&mut snapshot.stages) {
             from.snapshot_into(to);
         }
+        self.timeline.snapshot_into(&mut snapshot.timeline, self.stages.len());
         self.misses_into(snapshot);
     }
 

@@ -358,7 +358,7 @@ fn a_snapshot_comes_back_from_its_file() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
     assert!(Snapshot::read(&folder.path().join("none")).unwrap_err().to_string().contains("none"));
     Snapshot { version: 9, ..written }.write(&path).unwrap();
-    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 2"));
+    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 3"));
     std::fs::write(&path, "{").unwrap();
     assert!(Snapshot::read(&path).unwrap_err().to_string().contains("is no snapshot"));
 }
@@ -418,4 +418,63 @@ fn a_snapshot_into_used_memory_is_that_into_new_memory() {
     }
     assert_eq!(used, snapshot(&recorder));
     assert!(used.margin_p999_pct().is_some_and(|margin| (margin - 92.7).abs() < 0.1), "{:?}", used.margin_p999_pct());
+}
+
+// verifies REC-022
+#[test]
+fn the_timeline_says_when_sweeps_were_answered_missed_and_missing_and_what_they_spent_their_time_on() {
+    let mut recorder = start(settings()).unwrap();
+    // One sweep each tenth of a second from 1 s on; sweep 20 takes 300 ms, 30 to 34 never come, 40 is rejected.
+    for sweep in (0..50).filter(|sweep| !(30..35).contains(sweep)) {
+        let mut traces = sectored(sweep, 1, 1, 3);
+        if sweep == 20 {
+            traces[0].hops[3].finished_ns += 290 * MS;
+        }
+        if sweep == 40 {
+            traces[0].hops[2].verdict = Verdict::RejectedStale;
+        }
+        recorder.accept(&traces[0], &with_clusters(&[(5, 0, 0), (6, 0, 0)]));
+    }
+    let found = snapshot(&recorder);
+    let timeline = &found.timeline;
+    assert_eq!((timeline.begin_ns, timeline.bucket_ns), (1_000 * MS, 250 * MS));
+    let sum = |count: fn(&recorder::BucketSnapshot) -> u64| timeline.buckets.iter().map(count).sum::<u64>();
+    assert_eq!(sum(|bucket| bucket.sweeps), found.end_to_end.count());
+    assert_eq!((sum(|bucket| bucket.misses), found.deadline.misses), (2, 2));
+    assert_eq!((sum(|bucket| bucket.missing), found.missing_sweeps), (5, 5));
+    assert_eq!(sum(|bucket| bucket.detections.iter().sum()), 2 * 45);
+    // Sweep 20 was due at 3.1 s and answered at 3.4 s; 36 was the first after the gap, due at 4.6 s.
+    let at = |ns: u64| timeline.iter().find(|(begin_ns, _)| (*begin_ns..begin_ns + 250 * MS).contains(&ns)).unwrap().1;
+    assert_eq!((at(3_400 * MS).max_ns, at(3_400 * MS).misses), (300 * MS, 1));
+    assert_eq!(at(4_610 * MS).missing, 5);
+    let median = at(1_110 * MS).quantile_ns(0.5).unwrap();
+    assert!(median.abs_diff(10 * MS) <= 10 * MS / 32, "{median}");
+    assert_eq!(at(3_400 * MS).quantile_ns(1.0), Some(300 * MS));
+    let first = at(1_110 * MS);
+    assert_eq!(first.source_late_ns, first.sweeps * MS);
+    assert_eq!(first.spent_ns[1..], [[0, 0, first.sweeps * 3 * MS]; 3]);
+}
+
+#[test]
+fn a_timeline_of_years_has_as_many_buckets_as_one_of_minutes() {
+    let mut recorder = start(settings()).unwrap();
+    for sweep in (0..40).map(|power| 1 << power) {
+        recorder.accept(&sectored(sweep, 1, 1, 3)[0], &empty());
+    }
+    let found = snapshot(&recorder);
+    assert!(found.timeline.buckets.len() <= 600);
+    assert_eq!(found.timeline.buckets.iter().map(|bucket| bucket.sweeps).sum::<u64>(), 40);
+}
+
+#[test]
+fn the_points_of_a_distribution_are_few_and_end_with_its_longest() {
+    let sut = LatencySnapshot { values_ns: (1..=100_000).map(|us| [us * 1_000, 3]).collect(), beyond: 0 };
+    let points = sut.points();
+    assert!(points.len() < 150, "{}", points.len());
+    assert_eq!(points.last(), Some(&[100 * MS, 300_000]));
+    assert!(points.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]));
+    // Between two points the share of longer values falls by 10 %, or by one value.
+    let beyond = |point: &[u64; 2]| (300_000 - point[1]) as f64;
+    assert!(points.windows(2).all(|pair| beyond(&pair[1]) >= 0.9 * beyond(&pair[0]) - 6.0));
+    assert!(LatencySnapshot::default().points().is_empty());
 }
