@@ -16,7 +16,7 @@ pub struct Inlet<T: Message> {
 }
 
 /// A message in shared memory, read in place. Dropped, it is released.
-pub struct Taken<T: Message>(Sample<Ipc, Wire<T>, WireTrace>);
+pub struct Taken<T: Message>(pub(crate) Sample<Ipc, Wire<T>, WireTrace>);
 
 impl<T: Message> Inlet<T> {
     pub(crate) fn new(topic: Topic<T>, wakeups: &Wakeups, queue_parts: usize) -> Result<Self, TransportError> {

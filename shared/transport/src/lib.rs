@@ -13,6 +13,7 @@ mod inlet;
 mod instance;
 mod node;
 mod outlet;
+mod tap;
 mod wire;
 
 pub use bill::Segment;
@@ -21,3 +22,4 @@ pub use inlet::{Inlet, Taken};
 pub use instance::{Instance, InstanceError, MAX_NAME_LEN};
 pub use node::{Node, ServiceHold};
 pub use outlet::{Loan, Outlet};
+pub use tap::Tap;

@@ -1,19 +1,20 @@
 use std::time::Duration;
 
+use iceoryx2::config::ConfigCreationError;
 use iceoryx2::node::CleanupState;
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use messages::Message;
 
 use crate::wire::{Wire, WireTrace};
-use crate::{Inlet, Instance, Outlet, TransportError};
+use crate::{Inlet, Instance, Outlet, Tap, TransportError};
 
 pub(crate) type Ipc = ipc::Service;
 pub(crate) type Topic<T> = publish_subscribe::PortFactory<Ipc, Wire<T>, WireTrace>;
 pub(crate) type Wakeups = event::PortFactory<Ipc>;
 
-/// Readers of a topic: the next stage and two taps. Each adds its buffer to the shared memory bill.
-pub(crate) const MAX_SUBSCRIBERS: usize = 3;
+/// Readers of a topic: the next stage, the tape and two viewers. Each adds its buffer to the shared memory bill.
+pub(crate) const MAX_SUBSCRIBERS: usize = 4;
 /// Messages that a reader may hold at once.
 pub(crate) const MAX_BORROWED: usize = 2;
 /// Processes that may have a topic open at once.
@@ -41,16 +42,31 @@ impl Node {
     /// Joins an instance as `name`. `queue_parts` is the number of messages that wait for a slow reader before the
     /// oldest is dropped; all processes of an instance must name the same.
     pub fn join(instance: &Instance, name: &str, queue_parts: usize) -> Result<Self, TransportError> {
+        // Dead nodes without details are cleaned with the global configuration, so it must be ours too.
+        Self::with_config(instance, name, queue_parts, |path| Config::setup_global_config_from_file(path).cloned())
+    }
+
+    /// Visits an instance as a viewer: may only tap, and may visit another one afterwards, whose configuration differs
+    /// though its name be the same.
+    pub fn visit(instance: &Instance, name: &str, queue_parts: usize) -> Result<Self, TransportError> {
+        Self::with_config(instance, name, queue_parts, Config::from_file)
+    }
+
+    fn with_config(
+        instance: &Instance,
+        name: &str,
+        queue_parts: usize,
+        read: impl FnOnce(&FilePath) -> Result<Config, ConfigCreationError>,
+    ) -> Result<Self, TransportError> {
         // A failure is returned and handled once; iceoryx2 would log it at every level it passes.
         set_log_level(LogLevel::Fatal);
         let fail = |cause: &dyn std::fmt::Debug| TransportError::new("join", instance.name(), cause);
         let path = FilePath::new(instance.config_path().as_os_str().as_encoded_bytes()).map_err(|e| fail(&e))?;
-        // Dead nodes without details are cleaned with the global configuration, so it must be ours too.
-        let config = Config::setup_global_config_from_file(&path).map_err(|e| fail(&e))?;
+        let config = read(&path).map_err(|e| fail(&e))?;
         let name = NodeName::new(name).map_err(|e| fail(&e))?;
         let node = NodeBuilder::new()
             .name(&name)
-            .config(config)
+            .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Ipc>()
             .map_err(|e| fail(&e))?;
@@ -103,6 +119,12 @@ impl Node {
     pub fn inlet<T: Message>(&self) -> Result<Inlet<T>, TransportError> {
         let (topic, wakeups) = self.open::<T>()?;
         Inlet::new(topic, &wakeups, self.queue_parts)
+    }
+
+    /// Opens a service to look at what passes, without being woken for it.
+    pub fn tap<T: Message>(&self) -> Result<Tap<T>, TransportError> {
+        let (topic, _) = self.open::<T>()?;
+        Tap::new(&topic, self.queue_parts)
     }
 
     fn open<T: Message>(&self) -> Result<(Topic<T>, Wakeups), TransportError> {

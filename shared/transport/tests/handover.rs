@@ -61,6 +61,23 @@ fn messages_arrive_in_order_and_the_oldest_yields_to_the_newest() {
     let kept: Vec<u64> = std::iter::from_fn(|| inlet.take().unwrap()).map(|t| t.trace().part.ordinal).collect();
     assert_eq!(kept, [6, 7, 8, 9], "a queue of four keeps the newest four");
 
+    for ordinal in 10..13 {
+        send(ordinal);
+    }
+    assert!(inlet.take().unwrap().is_some());
+    let viewer = Node::visit(&running.0, "viewer", 4).unwrap();
+    let taps = [viewer.tap::<Sweep>().unwrap(), viewer.tap::<Sweep>().unwrap(), viewer.tap::<Sweep>().unwrap()];
+    let refused = viewer.tap::<Sweep>().err().unwrap().to_string();
+    assert!(refused.contains("3 are attached beside the next stage already"), "{refused}");
+    for ordinal in 13..20 {
+        send(ordinal);
+    }
+    for tap in &taps {
+        let seen: Vec<u64> = std::iter::from_fn(|| tap.take().unwrap()).map(|t| t.trace().part.ordinal).collect();
+        assert_eq!(seen, [16, 17, 18, 19], "a tap sees the newest of what came after it, whoever else reads");
+    }
+    drop((taps, viewer));
+
     let missing = node.outlet::<Truth>().err().unwrap();
     assert!(missing.to_string().contains(Truth::TYPE), "{missing}");
     assert!(running.0.shared_memory().len() > 1);

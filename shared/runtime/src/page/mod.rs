@@ -5,8 +5,10 @@
 
 mod ledger;
 mod map;
+mod view;
 mod words;
 
 pub use ledger::{Gap, GapKind, Settlement};
 pub use map::PageMap;
+pub use view::{Counts, PageView};
 pub use words::{Page, State};
