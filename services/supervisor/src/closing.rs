@@ -8,6 +8,7 @@ use crate::ledger;
 use crate::overload::OverloadReport;
 use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS};
 use crate::report::{Facts, Report};
+use crate::timeline_report::TimelineReport;
 use crate::watch::Watch;
 
 impl Watch<'_> {
@@ -22,7 +23,10 @@ impl Watch<'_> {
         }
         self.usage.update(std::process::id(), settled);
         let own_cpu_s = self.stages.iter().map(|stage| stage.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
-        self.machine.look(clock::now_ns(), own_cpu_s);
+        let now_ns = clock::now_ns();
+        let machine = self.machine.look(now_ns, own_cpu_s);
+        let usages = self.stages.iter().map(|stage| &stage.usage).chain([&self.usage]);
+        self.timeline.look(now_ns, usages, machine, self.noise.take_latest_ns());
     }
 
     fn overload_report(&mut self) -> OverloadReport {
@@ -42,9 +46,14 @@ impl Watch<'_> {
         let mut processes: Vec<_> =
             self.stages.iter().map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
         processes.push(ProcessReport::of_supervisor(&self.usage, duration_s));
+        let snapshot = self.snapshot();
+        let stages: Vec<&str> = snapshot.stages.iter().map(|stage| stage.stage.as_str()).collect();
+        let names: Vec<&str> = processes.iter().map(|process| process.stage.as_str()).collect();
+        let timeline = TimelineReport::of(&self.timeline, &snapshot.timeline, &stages, &names);
         Report::of(Facts {
             plan: self.plan,
-            snapshot: self.snapshot(),
+            timeline,
+            snapshot,
             ledger: ledger::account(&pages, self.plan.chain.sectors),
             published: self.stages[0].page.published.get(),
             duration_s,

@@ -21,6 +21,8 @@ mod services;
 mod settle;
 mod status;
 mod summary;
+mod timeline;
+mod timeline_report;
 mod watch;
 
 pub use error::SupervisorError;
@@ -30,7 +32,10 @@ pub use machine::{CpuTimes, MachineLoad};
 pub use noise::measure_noise;
 pub use overload::{Move, OverloadReport};
 pub use processes::ProcessReport;
-pub use report::{DeadlineReport, LEAST_MARGIN_PCT, LatencyReport, Report, StageLatency, TraceReport};
+pub use report::{DeadlineReport, LEAST_MARGIN_PCT, LatencyReport, Report, StageLatency, TraceReport, VerdictReport};
 pub use status::{StageStatus, Status, status};
 pub use summary::summary;
+pub use timeline_report::{
+    Event, HistogramReport, LatencyBucket, MachineTimeline, ProcessTimeline, SpentTime, TimelineReport,
+};
 pub use watch::{Settings, run};

@@ -54,10 +54,20 @@ struct Look {
 
 /// Shares between two looks [% of a core].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Shares {
-    steal: f64,
-    foreign: f64,
-    own: f64,
+pub(crate) struct Shares {
+    pub(crate) steal: f64,
+    pub(crate) foreign: f64,
+    pub(crate) own: f64,
+}
+
+impl Shares {
+    pub(crate) fn plus(self, other: Self) -> Self {
+        Self { steal: self.steal + other.steal, foreign: self.foreign + other.foreign, own: self.own + other.own }
+    }
+
+    pub(crate) fn times(self, factor: f64) -> Self {
+        Self { steal: self.steal * factor, foreign: self.foreign * factor, own: self.own * factor }
+    }
 }
 
 impl Look {
@@ -85,25 +95,25 @@ pub(crate) struct Machine {
 const NEAREST_LOOKS_NS: u64 = 500_000_000;
 
 impl Machine {
-    /// One look, with the CPU time that this chain has used by now.
-    pub(crate) fn look(&mut self, at_ns: u64, own_cpu_s: f64) {
-        if let Some(times) = CpuTimes::now() {
-            self.add(Look { at_ns, times, own_cpu_s });
-        }
+    /// One look, with the CPU time that this chain has used by now; the time since the last one [s] and the shares in it.
+    pub(crate) fn look(&mut self, at_ns: u64, own_cpu_s: f64) -> Option<(f64, Shares)> {
+        let times = CpuTimes::now()?;
+        self.add(Look { at_ns, times, own_cpu_s })
     }
 
-    fn add(&mut self, look: Look) {
+    fn add(&mut self, look: Look) -> Option<(f64, Shares)> {
         let Some(last) = self.last else {
             (self.first, self.last) = (Some(look), Some(look));
-            return;
+            return None;
         };
         if look.at_ns < last.at_ns + NEAREST_LOOKS_NS {
-            return;
+            return None;
         }
         let shares = look.shares_since(&last);
         self.worst.steal = self.worst.steal.max(shares.steal);
         self.worst.foreign = self.worst.foreign.max(shares.foreign);
         self.last = Some(look);
+        Some(((look.at_ns - last.at_ns) as f64 / 1e9, shares))
     }
 
     /// What the report says: nothing when the run was over before a second look.

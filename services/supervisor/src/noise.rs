@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU64;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
 use hdrhistogram::Histogram;
@@ -22,6 +22,8 @@ const SIGNIFICANT_DIGITS: u8 = 2;
 /// threads that go first. It has the supervisor's priority (none: ordinary scheduling) and no core of its own.
 pub(crate) struct Noise {
     stop: Arc<AtomicBool>,
+    /// Latest wake since it was last asked for [ns].
+    latest_ns: Arc<AtomicU64>,
     thread: Option<JoinHandle<Option<Histogram<u64>>>>,
 }
 
@@ -29,16 +31,23 @@ impl Noise {
     /// Starts it. A machine that has no thread for it gets no figure.
     pub(crate) fn start(priority: u32) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&stop);
+        let latest_ns = Arc::new(AtomicU64::new(0));
+        let (asked, latest) = (Arc::clone(&stop), Arc::clone(&latest_ns));
         let probe = move || {
             if priority > 0 {
                 // A refusal is the supervisor's as well, which warns of it.
                 let _ = realtime::raise(priority);
             }
-            listen(TICK_NS, |_| asked.load(Ordering::Relaxed))
+            let note = |late_ns| _ = latest.fetch_max(late_ns, Ordering::Relaxed);
+            listen(TICK_NS, note, |_| asked.load(Ordering::Relaxed))
         };
         let thread = std::thread::Builder::new().name("noise".to_owned()).spawn(probe).ok();
-        Self { stop, thread }
+        Self { stop, latest_ns, thread }
+    }
+
+    /// The latest wake since this was last asked [ns].
+    pub(crate) fn take_latest_ns(&self) -> u64 {
+        self.latest_ns.swap(0, Ordering::Relaxed)
     }
 
     /// Ends it; what it found.
@@ -58,11 +67,11 @@ impl Drop for Noise {
 /// How late the calling thread wakes when it sleeps to ticks of 1 ms for `for_ns`. Afterwards its timer slack is 1 ns.
 pub fn measure_noise(for_ns: u64) -> Percentiles {
     let end_ns = clock::now_ns() + for_ns;
-    listen(SHORT_TICK_NS, |now_ns| now_ns >= end_ns).as_ref().map_or(Percentiles::default(), percentiles)
+    listen(SHORT_TICK_NS, |_| (), |now_ns| now_ns >= end_ns).as_ref().map_or(Percentiles::default(), percentiles)
 }
 
-/// Sleeps from tick to tick [ns] until `done` at this host time.
-fn listen(period_ns: u64, done: impl Fn(u64) -> bool) -> Option<Histogram<u64>> {
+/// Sleeps from tick to tick [ns] until `done` at this host time; tells `note` how late each wake was [ns].
+fn listen(period_ns: u64, note: impl Fn(u64), done: impl Fn(u64) -> bool) -> Option<Histogram<u64>> {
     let (low_ns, high_ns) = BOUNDS_NS;
     let mut late = Histogram::new_with_bounds(low_ns, high_ns, SIGNIFICANT_DIGITS).ok()?;
     // The kernel may wake ordinary threads up to 50 µs late on purpose; that is no noise.
@@ -71,6 +80,7 @@ fn listen(period_ns: u64, done: impl Fn(u64) -> bool) -> Option<Histogram<u64>> 
     loop {
         clock::sleep_until_ns(tick_ns);
         let now_ns = clock::now_ns();
+        note(now_ns.saturating_sub(tick_ns));
         // Open-loop: whoever sleeps through many ticks is late for each of them.
         while tick_ns <= now_ns {
             late.saturating_record(now_ns - tick_ns);
@@ -101,9 +111,12 @@ mod tests {
     }
 
     #[test]
-    fn the_probe_ends_when_told_to() {
+    fn the_probe_says_how_late_it_woke_and_ends_when_told_to() {
         let mut sut = Noise::start(0);
 
+        while sut.take_latest_ns() == 0 {
+            clock::sleep_ns(SHORT_TICK_NS);
+        }
         assert!(sut.finish().count > 0, "it looks at least once");
         assert_eq!(sut.finish(), Percentiles::default(), "there is one answer");
     }

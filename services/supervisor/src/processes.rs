@@ -81,6 +81,11 @@ impl Usage {
         self.cpu_of_earlier_lives_s + self.last.cpu_s
     }
 
+    /// Memory resident at the last look.
+    pub(crate) fn rss_kib(&self) -> u64 {
+        self.last.rss_kib
+    }
+
     fn scheduling(&self) -> Scheduling {
         self.scheduling_of_earlier_lives.plus(self.last.scheduling)
     }

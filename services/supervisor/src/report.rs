@@ -9,6 +9,7 @@ use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
 use crate::overload::OverloadReport;
 use crate::processes::ProcessReport;
+use crate::timeline_report::{HistogramReport, TimelineReport};
 
 /// Everything that is known of a run, as `--report` writes it.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -69,6 +70,21 @@ pub struct Report {
     pub trace: Option<TraceReport>,
     /// Why the run stopped before its end, where it did.
     pub stopped: Option<String>,
+    /// How the command ends, and why.
+    pub verdict: VerdictReport,
+    /// The distributions that `latency_ms` and its neighbours give percentiles of.
+    pub latency_histogram_ms: HistogramReport,
+    /// How all this went over time.
+    pub timeline: TimelineReport,
+}
+
+/// How the command ends.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct VerdictReport {
+    /// Why with exit code 1; null for 0.
+    pub failed: Option<String>,
+    /// The same with `--strict`.
+    pub failed_strict: Option<String>,
 }
 
 /// The trace file in numbers. A part has about three events in each stage.
@@ -140,6 +156,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) noise_ms: Percentiles,
     pub(crate) realtime_refused: Vec<String>,
     pub(crate) stopped: Option<String>,
+    pub(crate) timeline: TimelineReport,
 }
 
 impl Report {
@@ -154,7 +171,7 @@ impl Report {
             };
             (stage.stage.clone(), latency)
         });
-        Self {
+        let mut report = Self {
             encke: env!("CARGO_PKG_VERSION").to_owned(),
             machine: machine(),
             source: plan.source.from.display().to_string(),
@@ -173,6 +190,7 @@ impl Report {
             seam_latency_ms: snapshot.seam.percentiles(),
             deadline: deadline(plan, &snapshot, &ledger),
             overload,
+            latency_histogram_ms: HistogramReport::of(&snapshot),
             worst_sweeps: snapshot.worst,
             steps: snapshot.steps,
             processes,
@@ -195,7 +213,12 @@ impl Report {
             }),
             ledger,
             stopped,
-        }
+            verdict: VerdictReport::default(),
+            timeline: facts.timeline,
+        };
+        let [failed, failed_strict] = [false, true].map(|strict| report.failure(strict));
+        report.verdict = VerdictReport { failed, failed_strict };
+        report
     }
 
     /// Parts dropped on any hop.

@@ -20,6 +20,7 @@ use crate::progress::Progress;
 use crate::report::Report;
 use crate::services::Services;
 use crate::settle::settle;
+use crate::timeline::Timeline;
 
 /// Between two looks at the pages.
 const LOOK: Duration = Duration::from_millis(5);
@@ -90,6 +91,7 @@ pub(crate) struct Watch<'a> {
     pub(crate) usage: Usage,
     pub(crate) machine: Machine,
     pub(crate) noise: Noise,
+    pub(crate) timeline: Timeline,
     /// What the kernel refused, and the seat before it was asked.
     pub(crate) refused: Vec<String>,
     pub(crate) as_before: Option<AsBefore>,
@@ -133,6 +135,7 @@ impl<'a> Watch<'a> {
             overload: OverloadReport::default(),
             machine: Machine::default(),
             noise: Noise::start(plan.chain.realtime.seat(SUPERVISOR).priority),
+            timeline: Timeline::new(now_ns),
             refused: Vec::new(),
             as_before: None,
             begun: false,
@@ -297,6 +300,7 @@ impl<'a> Watch<'a> {
             return Ok(());
         }
         stage.recovering = true;
+        self.timeline.restarted(clock::now_ns(), &stage.name, ended);
         // A child inherits the seat of the one who starts it.
         let _for_the_child = self.as_before.as_ref().map(AsBefore::for_a_moment);
         stage.start()
@@ -327,6 +331,7 @@ impl<'a> Watch<'a> {
         let Some(step) = self.ladder.look(sweeps, trouble) else { return };
         source.step.set(self.ladder.step() as u64);
         tracing::warn!(sweep = step.sweep, from = step.from, to = step.to, reason = step.reason, "overload");
+        self.timeline.stepped(clock::now_ns(), &step);
         self.overload.note(step);
     }
 }
