@@ -45,7 +45,10 @@ impl Assets {
 
     /// The bytes of a file, by its path relative to a configuration folder, or absolute.
     pub(crate) fn bytes(&self, path: &str) -> Result<Cow<'static, [u8]>, AssetError> {
-        for dir in &self.dirs {
+        // An absolute path stays what it is, whatever folder it is joined to.
+        let root = [PathBuf::from("/")];
+        let dirs = if Path::new(path).is_absolute() { &root[..] } else { &self.dirs };
+        for dir in dirs {
             let path = dir.join(path);
             match fs::read(&path) {
                 Ok(bytes) => return Ok(Cow::Owned(bytes)),
@@ -85,6 +88,14 @@ mod tests {
         fs::write(dir.path().join("chain.toml"), "mine").unwrap();
         assert_eq!(sut.text("chain.toml").unwrap(), "mine");
         assert_ne!(built_in, "mine");
+    }
+
+    #[test]
+    fn an_absolute_path_needs_no_folder_of_configuration() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("scene.toml");
+        fs::write(&path, "mine").unwrap();
+        assert_eq!(Assets::default().text(path.to_str().unwrap()).unwrap(), "mine");
     }
 
     #[test]
