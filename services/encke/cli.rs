@@ -148,6 +148,9 @@ pub(crate) struct RunArgs {
     /// At sensor rate (a slow stage drops and counts), or as fast as the chain goes (nothing is dropped).
     #[arg(long, value_enum, default_value_t = PaceArg::Realtime)]
     pub(crate) pace: PaceArg,
+    /// So many times as fast as the sensor was: 0.1 to 10. Not with --pace fast.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_rate)]
+    pub(crate) rate: f64,
     /// Stop after N sweeps. [default: 100 for a scene, all of a recording]
     #[arg(long, value_name = "N", conflicts_with = "duration")]
     pub(crate) sweeps: Option<u64>,
@@ -172,6 +175,9 @@ pub(crate) struct RunArgs {
     /// Write the way of every part through the stages, for ui.perfetto.dev; - is standard output.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) trace: Option<PathBuf>,
+    /// Record sweeps, detections and more, to replay them or to look at them in Foxglove.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub(crate) record: Option<PathBuf>,
     /// Write the summary as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
@@ -229,6 +235,11 @@ fn parse_span(text: &str) -> Result<Span, String> {
     }
     let duration = parse_duration(text)?;
     if duration.is_zero() { Err("must be more than 0s".to_owned()) } else { Ok(Span::For(duration)) }
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate: f64 = text.parse().map_err(|cause| format!("{cause}"))?;
+    if (0.1..=10.0).contains(&rate) { Ok(rate) } else { Err("must be 0.1 to 10".to_owned()) }
 }
 
 fn parse_duration(text: &str) -> Result<Duration, String> {

@@ -183,6 +183,7 @@ fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
         resume: shell.incarnation() > 1,
         queue_parts: WRITER_QUEUE_PARTS.max(plan.chain.queue_parts()),
         lossless: plan.pace == Pace::Fast,
+        in_order_from: (plan.pace == Pace::Fast).then(|| shell.answered_sweeps()),
         paced: plan.pace == Pace::Realtime,
         deadline_ms: plan.chain.deadline_ms,
         stages: plan.stages().filter(|stage| *stage != RECORDER).map(str::to_owned).collect(),

@@ -8,7 +8,7 @@ use supervisor::{Report, Settings};
 use transport::Instance;
 
 use crate::assets::Assets;
-use crate::cli::{RunArgs, Span};
+use crate::cli::{PaceArg, RunArgs, Span};
 use crate::{Failure, dispatch, outputs, sources};
 
 /// Runs the chain and prints its summary.
@@ -25,6 +25,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         ("--detections", plan.outputs.detections.as_deref()),
         ("--labels", plan.outputs.labels.as_deref()),
         ("--trace", plan.outputs.trace.as_deref()),
+        ("--record", plan.outputs.record.as_deref()),
         ("--report", args.report.as_deref()),
     ];
     outputs::check(&files, &plan.source.from)?;
@@ -82,6 +83,7 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
             max_range_m: args.max_range,
             repeat: args.repeat,
             seed: args.seed,
+            rate: args.rate,
         },
         pace: args.pace.into(),
         sweeps,
@@ -90,6 +92,7 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
             detections: absolute(&args.detections)?,
             labels: absolute(&args.labels)?,
             trace: absolute(&args.trace)?,
+            record: absolute(&args.record)?,
         },
         config_dirs: assets.dirs().to_vec(),
         chain,
@@ -108,6 +111,9 @@ fn refuse_idle_options(args: &RunArgs, is_scene: bool) -> Result<(), Failure> {
     let idle = for_recordings.into_iter().find(|(_, given)| *given && is_scene);
     if let Some((option, _)) = idle {
         return Err(Failure::start(format!("{option} is for recordings, and the source is a scene: leave it out")));
+    }
+    if args.rate != 1.0 && matches!(args.pace, PaceArg::Fast) {
+        return Err(Failure::start("--rate is for --pace realtime, and the pace is fast: leave one of them out"));
     }
     if args.seed.is_some() && !is_scene {
         return Err(Failure::start("--seed is for scenes, and the source is a recording: leave it out"));

@@ -51,9 +51,16 @@ impl Run {
 
     /// Starts it.
     pub fn start(&self) -> Child {
+        self.start_with(|encke| encke)
+    }
+
+    /// Starts it by another command that is made of its own.
+    pub fn start_with(&self, wrap: impl FnOnce(Command) -> Command) -> Child {
         let mut command = encke();
-        command.arg("run").args(&self.args).stdout(Stdio::piped()).stderr(Stdio::piped());
-        command.spawn().unwrap()
+        command.arg("run").args(&self.args);
+        let mut command = wrap(command);
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 
     /// Runs it to its end.
@@ -227,6 +234,12 @@ pub fn encke() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_encke"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
     command
+}
+
+/// Kills a process of this test.
+pub fn kill(pid: u64) {
+    let pid = rustix::process::Pid::from_raw(pid as i32).unwrap();
+    rustix::process::kill_process(pid, rustix::process::Signal::KILL).unwrap();
 }
 
 /// What an instance left in shared memory or on disk.

@@ -71,7 +71,7 @@ const FULL_LAST_SECTOR: &str = "full_last_sector";
 
 /// Every sweep is whole.
 pub(super) const PART: Part =
-    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
+    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
 
 /// A stage would not take the sweep.
 #[derive(Debug, thiserror::Error)]

@@ -16,7 +16,7 @@ use crate::{Failure, dispatch, run};
 const PLAN: &str = "config/evaluation/reference.toml";
 
 /// Every sweep is whole.
-const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
+const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
 
 /// Measures the chain's classifier, prints its bars, and writes `evaluate.json` and `evaluate.html`.
 pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {

@@ -15,7 +15,7 @@ use crate::few::leave_out_larger;
 const ATTEMPTS: u32 = 10_000;
 
 /// Every sweep is whole.
-const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
+const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
 
 /// One obstacle as the chain describes it.
 #[derive(Clone, Debug, PartialEq)]

@@ -78,9 +78,10 @@ impl Assembly {
         if self.seen > 0 && self.sweep.part.sweep != part.sweep { self.end() } else { None }
     }
 
-    /// Adds a part; gives the sweep when it was the last one.
+    /// Adds a part; gives the sweep when it was the last one. A first sector begins anew, also of the sweep that is open.
     pub(crate) fn add(&mut self, rows: &PartRows) -> Option<&SweepRows> {
-        if self.seen == 0 {
+        if self.seen == 0 || rows.part.sector == 0 {
+            self.seen = 0;
             self.sweep.begin(rows.part);
         }
         self.seen += 1;
@@ -177,6 +178,18 @@ mod tests {
         assert!(sut.add(&PartRows { rejected: true, ..rows(0, 1, &[]) }).is_none());
         let sweep = sut.add(&rows(0, 2, &[1])).unwrap();
         assert_eq!((sweep.complete, sweep.missing_sectors, sweep.rejected_sectors), (false, 0, 1));
+    }
+
+    #[test]
+    fn a_sweep_that_is_sent_again_counts_once() {
+        let mut sut = Assembly::default();
+        assert!(sut.add(&rows(0, 0, &[0])).is_none());
+        assert!(sut.add(&rows(0, 1, &[1])).is_none());
+        for sector in 0..2 {
+            assert!(sut.add(&rows(0, sector, &[sector])).is_none());
+        }
+        let sweep = sut.add(&rows(0, 2, &[2])).unwrap();
+        assert_eq!((sweep.detections.len(), sweep.recorded, sweep.complete), (3, 3, true));
     }
 
     #[test]

@@ -21,6 +21,7 @@
 //!     resume: false,
 //!     queue_parts: 4,
 //!     lossless: true,
+//!     in_order_from: None,
 //!     paced: false,
 //!     deadline_ms: 100.0,
 //!     stages: vec!["simulator".into(), "clusterer".into(), "extractor".into(), "classifier".into()],
@@ -47,6 +48,7 @@ mod detections_json;
 mod history;
 mod labels_csv;
 mod latency;
+mod order;
 mod output;
 mod part_rows;
 mod recorder;

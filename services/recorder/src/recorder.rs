@@ -7,8 +7,10 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use messages::{Detections, Trace, Verdict};
 use stage::{Settled, Sink, SinkError};
 
+use crate::order::{Order, Place};
 use crate::output::{Commit, Failure, Output};
 use crate::part_rows::{PartRows, is_coherent};
+use crate::repair::Whole;
 use crate::settings::{RecorderError, Settings};
 use crate::snapshot::Snapshot;
 use crate::stats::Statistics;
@@ -28,6 +30,8 @@ pub struct Recorder {
     trace: Option<TraceLine>,
     progress: Arc<Progress>,
     lossless: bool,
+    /// Where the source sends again what was lost.
+    order: Option<Order>,
     with_members: bool,
     finished: bool,
     statistics_file: Option<PathBuf>,
@@ -55,7 +59,8 @@ impl Recorder {
         settings.check()?;
         let statistics = Statistics::new(&settings)?;
         let progress = Arc::new(Progress::new(settled));
-        let Outputs { detections, labels, trace } = open_outputs(&settings)?;
+        let Outputs { detections, labels, trace, last_sweep } = open_outputs(&settings)?;
+        let in_files = last_sweep.map_or(0, |last| last.saturating_add(1));
         let trace = trace.map(|output| TraceLine::start(output, &settings.stages, settings.lossless)).transpose()?;
         let with_members = labels.is_some();
         let line = if detections.is_none() && labels.is_none() {
@@ -70,6 +75,7 @@ impl Recorder {
             trace,
             progress,
             lossless: settings.lossless,
+            order: settings.in_order_from.map(|first| Order::from_sweep(first.max(in_files))),
             with_members,
             finished: false,
             statistics_file: settings.statistics,
@@ -129,13 +135,25 @@ impl Sink for Recorder {
     /// Counts the part, copies its rows into a free buffer and passes it on. Never waits unless `lossless`.
     ///
     /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members or solids out of place.
+    /// [`Verdict::RejectedDouble`] and [`Verdict::RejectedAhead`]: see [`Settings::in_order_from`].
     fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+        match self.order.as_mut().map(|order| order.take(trace)) {
+            Some(Place::Double) => return Verdict::RejectedDouble,
+            Some(Place::Ahead) => return Verdict::RejectedAhead,
+            // The same part as before, which is in the statistics.
+            Some(Place::Again) => return self.take(trace, input),
+            Some(Place::Next) | None => {}
+        }
         let verdict = self.take(trace, input);
         let answer = self.statistics.add(trace, input, verdict);
         if let Some(line) = &self.trace {
             line.send(Traced { trace: *trace, answer });
         }
         verdict
+    }
+
+    fn wanted_attempt(&self) -> u32 {
+        self.order.map_or(0, |order| order.wanted_attempt())
     }
 
     /// Writes the statistics so far, where the settings name a file for them.
@@ -171,10 +189,12 @@ struct Outputs {
     detections: Option<Output>,
     labels: Option<Output>,
     trace: Option<Output>,
+    /// The last sweep that an earlier life has written.
+    last_sweep: Option<u64>,
 }
 
 fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
-    let mut whole = None;
+    let (mut whole, mut labelled) = (None, None);
     let detections = settings.detections.as_deref().map(|path| match settings.resume {
         false => Output::create(path, Commit::LastByte),
         true => Output::resume(path, Commit::LastByte, |file| {
@@ -186,7 +206,11 @@ fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
     let detections = detections.transpose()?;
     let labels = settings.labels.as_deref().map(|path| match settings.resume {
         false => Output::create(path, Commit::FirstByte),
-        true => Output::resume(path, Commit::FirstByte, |file| Ok(repair::labels(path, file, whole)?.length)),
+        true => Output::resume(path, Commit::FirstByte, |file| {
+            let found = repair::labels(path, file, whole)?;
+            labelled = found.last_sweep;
+            Ok(found.length)
+        }),
     });
     let labels = labels.transpose()?;
     let trace = settings.trace.as_deref().map(|path| match settings.resume {
@@ -203,7 +227,8 @@ fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
     if is_same(&detections, &trace) || is_same(&labels, &trace) {
         return Err(RecorderError::SameFile(settings.trace.clone().unwrap_or_default()));
     }
-    Ok(Outputs { detections, labels, trace })
+    let last_sweep = whole.map_or(labelled, |whole: Whole| whole.last_sweep);
+    Ok(Outputs { detections, labels, trace, last_sweep })
 }
 
 fn tell(failures: &[Failure]) -> String {

@@ -24,6 +24,10 @@ pub struct Settings {
     pub queue_parts: usize,
     /// Wait for the writer when all buffers are full (`--pace fast`) instead of rejecting the part.
     pub lossless: bool,
+    /// Where the source sends again what was lost: the sweep to be answered next, as far as earlier lives have said (their
+    /// files may know of later ones). Each sweep is then taken once, as a whole and in order; what does not follow is
+    /// rejected as `double` or `ahead`. None: parts are taken as they come.
+    pub in_order_from: Option<u64>,
     /// Whether a sensor's clock (or its simulation) paces the sweeps. Without it a return has no time at which it
     /// should have been there: obstacle latencies and deadline misses are then not counted.
     pub paced: bool,
@@ -129,6 +133,7 @@ mod tests {
             resume: false,
             queue_parts: 1,
             lossless: false,
+            in_order_from: None,
             paced: true,
             deadline_ms: 100.0,
             stages: vec!["simulator".into()],

@@ -8,6 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{HandMade, lines, rows, settings, settings_in, start};
+use messages::Verdict;
 use recorder::{RecorderError, Settings};
 use stage::Sink;
 
@@ -90,6 +91,24 @@ fn labels_torn_at_any_byte_are_cut_to_the_sweep_before() {
 }
 
 // verifies REC-006
+// verifies REC-022
+#[test]
+fn what_is_in_the_files_is_not_written_again() {
+    let folder = memory_folder();
+    run(settings_in(folder.path()), 0..3);
+    // Its page did not say yet that sweep 2 was written.
+    let settings = Settings { resume: true, in_order_from: Some(2), ..settings_in(folder.path()) };
+    let mut recorder = start(Settings { stages: vec!["replay".into()], ..settings }).unwrap();
+    let mut accept = |sweep| {
+        let (trace, detections) = HandMade::interleaved(sweep, 8, 1, 4).whole();
+        recorder.accept(&trace, &detections)
+    };
+    assert_eq!([2, 4, 3].map(&mut accept), [Verdict::RejectedDouble, Verdict::RejectedAhead, Verdict::Complete]);
+    assert_eq!(recorder.wanted_attempt(), 1);
+    recorder.finish().unwrap();
+    assert_eq!(read(folder.path()), files(0..4));
+}
+
 #[test]
 fn labels_alone_lose_no_whole_sweep() {
     let folder = memory_folder();

@@ -55,7 +55,7 @@ impl Watch<'_> {
             timeline,
             snapshot,
             ledger: ledger::account(&pages, self.plan.chain.sectors),
-            published: self.stages[0].page.published.get(),
+            published: self.stages[0].page.next_ordinal_out.get(),
             duration_s,
             processes,
             overload,

@@ -29,7 +29,7 @@ pub struct HopReport {
     pub received: u64,
     /// Parts processed.
     pub processed: u64,
-    /// Parts rejected, by reason.
+    /// Parts rejected, by reason; `resent`: they died with a process, and were sent again until they were answered.
     pub rejected: BTreeMap<String, u64>,
     /// Parts that never came, by reason.
     pub dropped: BTreeMap<String, u64>,
@@ -46,7 +46,7 @@ pub struct HopReport {
 pub struct GapReport {
     /// The stage that did not get them.
     pub stage: String,
-    /// `dropped` or `lost`.
+    /// `dropped`, `lost`, or `resent`.
     pub kind: String,
     /// First sweep of the gap.
     pub first_sweep: u64,
@@ -60,11 +60,15 @@ pub struct GapReport {
 /// first. By then nothing may be on its way any more.
 pub(crate) fn account(pages: &[(&str, &Page)], sectors: u32) -> LedgerReport {
     let sink = pages.len().saturating_sub(2);
+    let made_good = is_made_good(pages);
     let mut hops: Vec<HopReport> =
         pages.windows(2).enumerate().map(|(place, pair)| hop(pair[0].1, pair[1].0, pair[1].1, place == sink)).collect();
+    if made_good {
+        hops.iter_mut().for_each(HopReport::make_good);
+    }
     // What a source made and never published stands in no category of any hop.
     if let (Some((_, source)), Some(first)) = (pages.first(), hops.first_mut()) {
-        first.open += source.next_ordinal_out.get().abs_diff(source.published.get());
+        first.open += (source.next_ordinal_out.get() + source.resent.get()).abs_diff(source.published.get());
     }
     let sectors = u64::from(sectors.max(1));
     let gaps = pages
@@ -72,13 +76,37 @@ pub(crate) fn account(pages: &[(&str, &Page)], sectors: u32) -> LedgerReport {
         .flat_map(|(stage, page)| page.gaps().into_iter().map(move |gap| (stage, gap)))
         .map(|(stage, gap)| GapReport {
             stage: (*stage).to_owned(),
-            kind: if gap.kind == GapKind::Dropped { "dropped" } else { "lost" }.to_owned(),
+            kind: match gap.kind {
+                GapKind::Dropped => "dropped",
+                GapKind::Lost if made_good => RESENT,
+                GapKind::Lost => "lost",
+            }
+            .to_owned(),
             first_sweep: gap.first_ordinal / sectors,
             last_sweep: gap.end_ordinal.saturating_sub(1).max(gap.first_ordinal) / sectors,
             parts: gap.parts,
         })
         .collect();
     LedgerReport { closed: hops.iter().all(|hop| hop.open == 0 && hop.in_flight == 0), hops, gaps }
+}
+
+/// Why a part is rejected that was lost and sent again.
+const RESENT: &str = "resent";
+
+/// Whether the source has sent again what was lost, and the sink has answered all that was ever sent.
+fn is_made_good(pages: &[(&str, &Page)]) -> bool {
+    let (Some((_, source)), Some((_, sink))) = (pages.first(), pages.last()) else { return false };
+    source.attempt.get() > 0 && sink.next_ordinal_out.get() >= source.next_ordinal_out.get()
+}
+
+impl HopReport {
+    /// Nothing is lost of what was answered in the end.
+    fn make_good(&mut self) {
+        let lost = std::mem::take(&mut self.lost);
+        if lost > 0 {
+            *self.rejected.entry(RESENT.to_owned()).or_default() += lost;
+        }
+    }
 }
 
 fn hop(before: &Page, stage: &str, page: &Page, is_sink: bool) -> HopReport {
@@ -153,6 +181,22 @@ mod tests {
         let report = account(&[("source", &before), ("clusterer", &page), ("recorder", &sink)], 1);
         assert!(!report.closed);
         assert_eq!((report.hops[0].in_flight, report.hops[0].open), (3, 0));
+    }
+
+    #[test]
+    fn what_was_lost_and_answered_in_the_end_is_resent() {
+        let (_dir, [before, page, sink]) = pages();
+        before.attempt.set(1);
+        // Nine ordinals, of which one was sent twice.
+        before.next_ordinal_out.set(9);
+        before.resent.set(1);
+        for (answered, expected) in [(8, (1, None)), (9, (0, Some(1)))] {
+            sink.next_ordinal_out.set(answered);
+            let report = account(&[("source", &before), ("clusterer", &page), ("recorder", &sink)], 1);
+            let hop = &report.hops[0];
+            assert!(report.closed);
+            assert_eq!((hop.lost, hop.rejected.get(RESENT).copied()), expected);
+        }
     }
 
     #[test]

@@ -46,8 +46,8 @@ impl Progress {
         let line = format!(
             "{:7.1} s  sweep {}{goal}  answered {}  parts missing {missing}  restarts {restarts}",
             (now_ns - self.started_ns) as f64 / 1e9,
-            source.page.published.get() / self.sectors,
-            sink.page.processed.get() / self.sectors,
+            source.page.next_ordinal_out.get() / self.sectors,
+            sink.page.processed.get().min(sink.page.next_ordinal_out.get()) / self.sectors,
         );
         let mut stderr = std::io::stderr().lock();
         // A closed stderr is no reason to stop a chain.

@@ -57,8 +57,8 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
         });
     }
     let sectors = plan.chain.sectors;
-    let sweep = stages.first().map_or(0, |source| source.published) / u64::from(sectors.max(1));
     let source = PageMap::open(&Plan::page_path(instance, SOURCE))?;
+    let sweep = source.next_ordinal_out.get() / u64::from(sectors.max(1));
     let step = Step::from_number(source.step.get() as u32).name().to_owned();
     Ok(Status { instance: instance.name().to_owned(), mode: "nominal".to_owned(), sweep, sectors, step, stages })
 }

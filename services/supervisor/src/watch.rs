@@ -218,6 +218,13 @@ impl<'a> Watch<'a> {
         self.stages[0].page.state() == State::Ended
             && self.stages[0].is_up()
             && (1..self.stages.len()).all(|position| self.is_drained(position))
+            && (self.plan.pace == Pace::Realtime || self.is_answered())
+    }
+
+    /// Whether the sink has answered all that was sent, however often.
+    fn is_answered(&self) -> bool {
+        let (Some(source), Some(sink)) = (self.stages.first(), self.stages.last()) else { return true };
+        sink.page.next_ordinal_out.get() >= source.page.next_ordinal_out.get()
     }
 
     /// Whether nothing has moved for a while, nor will: nothing is held and the source waits in vain (parts were

@@ -21,8 +21,8 @@ pub struct Part {
     pub sensor_time_ns: u64,
     /// Number of the [`Step`] of degradation at which the whole sweep is to be processed.
     pub step: u32,
-    /// Fills the struct to a multiple of its alignment.
-    pub reserved: u32,
+    /// How often the source had gone back to send parts again before it sent this one.
+    pub attempt: u32,
 }
 
 impl Part {
@@ -60,11 +60,15 @@ pub enum Verdict {
     RejectedStale = 6,
     /// Left out on purpose: at [`Step::EverySecondSweep`] every odd sweep is.
     RejectedShed = 7,
+    /// At the sink: of a sweep that it has answered already.
+    RejectedDouble = 8,
+    /// At the sink: a part before it is missing, or was without what came before it; both will be sent again.
+    RejectedAhead = 9,
 }
 
 impl Verdict {
     /// All verdicts, by their number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Complete,
         Self::PartialCells,
         Self::RejectedIncomplete,
@@ -73,6 +77,8 @@ impl Verdict {
         Self::PartialFits,
         Self::RejectedStale,
         Self::RejectedShed,
+        Self::RejectedDouble,
+        Self::RejectedAhead,
     ];
 
     /// Whether the part counts as rejected in the ledger.
@@ -84,6 +90,8 @@ impl Verdict {
                 | Self::RejectedSinkFull
                 | Self::RejectedStale
                 | Self::RejectedShed
+                | Self::RejectedDouble
+                | Self::RejectedAhead
         )
     }
 
@@ -98,6 +106,8 @@ impl Verdict {
             Self::RejectedSinkFull => "sink_full",
             Self::RejectedStale => "stale",
             Self::RejectedShed => "shed",
+            Self::RejectedDouble => "double",
+            Self::RejectedAhead => "ahead",
         }
     }
 }

@@ -62,6 +62,17 @@ pub struct Truth {
     pub owners: Bounded<u16, MAX_RETURNS>,
 }
 
+impl Truth {
+    /// Makes this truth the same as another.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        self.sensor_time_ns = other.sensor_time_ns;
+        // As large as the other: both fit.
+        let _ = self.objects.extend_from_slice(&other.objects);
+        let _ = self.owners.extend_from_slice(&other.owners);
+    }
+}
+
 impl Message for Truth {
     const TYPE: &'static str = "encke.Truth.1";
 

@@ -8,6 +8,7 @@ pub mod clock;
 mod cycle;
 mod deadline;
 mod error;
+mod kept;
 pub mod logging;
 mod pacer;
 pub mod page;
@@ -24,7 +25,7 @@ mod window;
 
 pub use cycle::run_stage;
 pub use error::ShellError;
-pub use plan::{Outputs, Pace, Plan, SOURCE, SourcePlan};
+pub use plan::{Outputs, Pace, Plan, SOURCE, SourcePlan, TAPE};
 pub use run_delay::RunDelay;
 pub use shell::{AllocationCount, Shell};
 pub use shutdown::Shutdown;

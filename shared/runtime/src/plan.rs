@@ -11,6 +11,9 @@ use crate::ShellError;
 /// Name of the source among the stages of a chain.
 pub const SOURCE: &str = "source";
 
+/// Name of the process that reads along and keeps what the chain says.
+pub const TAPE: &str = "tape";
+
 /// Everything that the processes of one run must agree on. Written once by the supervisor into the instance's folder.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Plan {
@@ -47,6 +50,8 @@ pub struct SourcePlan {
     pub min_range_m: Option<f64>,
     /// Farthest accepted range [m], where it is not the sensor file's.
     pub max_range_m: Option<f64>,
+    /// Seconds of sensor time in a second of host time at [`Pace::Realtime`], 0.1 to 10.
+    pub rate: f64,
     /// Start again at the recording's end.
     pub repeat: bool,
     /// Seed of the scene, where it is not the scene's own.
@@ -72,6 +77,8 @@ pub struct Outputs {
     pub labels: Option<PathBuf>,
     /// The way of every part in the Trace Event Format.
     pub trace: Option<PathBuf>,
+    /// Sweeps, detections and more, in MCAP.
+    pub record: Option<PathBuf>,
 }
 
 impl Plan {
@@ -113,6 +120,11 @@ impl Plan {
     /// Names of all stages in flow order, the source first, the sink last.
     pub fn stages(&self) -> impl Iterator<Item = &str> {
         std::iter::once(SOURCE).chain(self.chain.stages.iter().map(|stage| stage.name.as_str()))
+    }
+
+    /// Name of the process that reads along and writes [`Outputs::record`], where there is one.
+    pub fn tape(&self) -> Option<&'static str> {
+        self.outputs.record.is_some().then_some(TAPE)
     }
 
     /// Parts that may be in flight at [`Pace::Fast`]. Half a queue: after a death up to twice as many may be.

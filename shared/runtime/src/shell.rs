@@ -80,6 +80,11 @@ impl Shell {
         self.incarnation
     }
 
+    /// Sweeps that this sink, or its lives before, have answered.
+    pub fn answered_sweeps(&self) -> u64 {
+        self.page.next_ordinal_out.get() / u64::from(self.plan.chain.sectors.max(1))
+    }
+
     pub(crate) fn join(&self) -> Result<Node, ShellError> {
         Ok(Node::join(&self.instance, &self.name, self.plan.chain.queue_parts())?)
     }

@@ -43,6 +43,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
             let verdict = self.sink.accept(taken.trace(), taken.message());
             self.shell.slow_down(taken.trace().part);
             self.shell.page.count_accepted(verdict);
+            self.shell.page.wanted_attempt.set(self.sink.wanted_attempt().into());
             self.shell.page.put_down();
         }
         Ok(())

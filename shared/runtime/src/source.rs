@@ -1,8 +1,8 @@
-use messages::{Cutter, Hop, Message, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
+use messages::{Cutter, Hop, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
 use stage::{Next, Source};
 use transport::{Loan, Outlet};
-use zerocopy::FromZeros;
 
+use crate::kept::Kept;
 use crate::pacer::Pacer;
 use crate::page::State;
 use crate::run_delay::Laps;
@@ -13,40 +13,33 @@ use crate::{Pace, Shell, ShellError, clock};
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
+/// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
+/// one that the sink has and has not yet written.
+const KEPT_BESIDE: usize = 2;
 
 /// The main loop of the source. Returns when it was asked to leave; at the end of the data it waits for that, because
-/// what it has sent lives in its shared memory.
+/// what it has sent lives in its shared memory, and may have to be sent again.
 pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellError> {
     let node = shell.join()?;
     let (sweeps, truths) = (node.outlet()?, node.outlet()?);
-    let mut out = Out::new(shell, &sweeps)?;
+    let mut out = Out::new(shell, &sweeps, &truths)?;
     shell.running();
     // Nothing is sent before everybody listens.
     wait_while(shell, LOOK_NS, || shell.page.may_start.get() == 0);
 
-    // A successor goes on where its predecessor stopped, in the middle of a sweep if need be.
-    let sectors = u64::from(shell.plan.chain.sectors.max(1));
-    let mut ordinal = shell.page.next_ordinal_out.get();
-    if ordinal >= sectors {
-        source.skip(ordinal / sectors, &mut out.whole, truths.loan()?.message_mut())?;
-    }
-    while !shell.leaving() && shell.plan.sweeps.is_none_or(|sweeps| ordinal / sectors < sweeps) {
-        let mut truth = truths.loan()?;
-        if !out.make(&mut source, truth.message_mut())? {
+    out.begin(&mut source)?;
+    while !(shell.leaving() && out.is_between_sweeps()) {
+        out.go_back_if_asked();
+        if !out.has_sweep() && !out.make(&mut source)? {
+            shell.page.set_state(State::Ended);
+            wait_while(shell, LOOK_NS, || !out.is_asked_back());
+            if !shell.leaving() {
+                shell.page.set_state(State::Running);
+            }
+        } else if !out.send()? {
             break;
         }
-        let end = (ordinal / sectors + 1) * sectors;
-        while ordinal < end && out.send(ordinal)? {
-            ordinal += 1;
-        }
-        if ordinal < end {
-            break;
-        }
-        *truth.trace_mut() = out.trace;
-        truth.send()?;
     }
-    shell.page.set_state(State::Ended);
-    wait_while(shell, LOOK_NS, || true);
     shell.left();
     Ok(())
 }
@@ -63,77 +56,144 @@ fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
 struct Out<'a> {
     shell: &'a Shell,
     sweeps: &'a Outlet<Sweep>,
-    window: Window,
+    truths: &'a Outlet<Truth>,
+    /// At [`Pace::Fast`] only.
+    window: Option<Window>,
     pacer: Pacer,
     cutter: Cutter,
-    whole: Box<Sweep>,
-    /// Host time at which the sweep's first firing is due [ns].
-    start_ns: u64,
-    began_ns: u64,
-    step: u32,
+    kept: Kept,
+    /// Of the part to be sent next.
+    ordinal: u64,
     trace: Trace,
     free_ns: u64,
     taken_by_others: Laps,
 }
 
 impl<'a> Out<'a> {
-    fn new(shell: &'a Shell, sweeps: &'a Outlet<Sweep>) -> Result<Self, ShellError> {
+    fn new(shell: &'a Shell, sweeps: &'a Outlet<Sweep>, truths: &'a Outlet<Truth>) -> Result<Self, ShellError> {
+        let plan = &shell.plan;
+        let (window, keep) = match plan.pace {
+            Pace::Realtime => (None, 1),
+            Pace::Fast => (Some(Window::open(shell)?), plan.chain.queue_sweeps + KEPT_BESIDE),
+        };
         Ok(Self {
             shell,
             sweeps,
-            window: Window::open(shell)?,
-            pacer: Pacer::default(),
-            cutter: Cutter::new(shell.plan.chain.sectors),
-            whole: Sweep::new_box_zeroed().map_err(|_| ShellError::Memory("a sweep"))?,
-            start_ns: 0,
-            began_ns: 0,
-            step: 0,
+            truths,
+            window,
+            pacer: Pacer::at_rate(plan.source.rate),
+            cutter: Cutter::new(plan.chain.sectors),
+            kept: Kept::new(keep)?,
+            ordinal: 0,
             trace: Trace::default(),
             free_ns: clock::now_ns(),
             taken_by_others: Laps::of_this_thread(),
         })
     }
 
-    /// Makes the next sweep. False at the end of the data.
-    fn make<S: Source>(&mut self, source: &mut S, truth: &mut Truth) -> Result<bool, ShellError> {
-        let began_ns = clock::now_ns();
-        self.whole.clear();
-        let next = source.next(&mut self.whole, truth)?;
-        self.shell.slow_down(Part { sectors: 1, ..Part::default() });
-        if next == Next::End || self.is_over(&self.whole.header) {
+    fn sectors(&self) -> u64 {
+        u64::from(self.shell.plan.chain.sectors.max(1))
+    }
+
+    /// A successor goes on where its predecessor stopped, in the middle of a sweep if need be; where parts are sent again
+    /// if they are lost, with the first sweep that is not answered.
+    fn begin<S: Source>(&mut self, source: &mut S) -> Result<(), ShellError> {
+        let page = &self.shell.page;
+        if self.window.is_some() && self.shell.incarnation > 1 {
+            self.go_back();
+        }
+        self.ordinal = page.next_ordinal_out.get();
+        self.kept.begin(self.ordinal / self.sectors(), source)
+    }
+
+    fn is_between_sweeps(&self) -> bool {
+        self.ordinal.is_multiple_of(self.sectors())
+    }
+
+    fn is_asked_back(&self) -> bool {
+        self.window.as_ref().is_some_and(|window| window.is_asked_back(self.shell.page.attempt.get()))
+    }
+
+    fn go_back_if_asked(&mut self) {
+        if self.is_asked_back() {
+            self.go_back();
+            self.ordinal = self.shell.page.next_ordinal_out.get();
+        }
+    }
+
+    /// The next part is the first of the first sweep that is not answered.
+    fn go_back(&mut self) {
+        let sectors = self.sectors();
+        let Some(window) = &mut self.window else { return };
+        let page = &self.shell.page;
+        let attempt = window.go_back().max(page.attempt.get() + 1);
+        // The window is such that all that may be asked for is kept.
+        let sweep = window.answered_sweeps().max(self.kept.first());
+        let ordinal = (sweep * sectors).min(page.next_ordinal_out.get());
+        tracing::warn!(sweep = ordinal / sectors, attempt, "parts are missing: sending again from this sweep on");
+        page.go_back(ordinal);
+        page.attempt.set(attempt);
+    }
+
+    fn has_sweep(&self) -> bool {
+        self.kept.has(self.ordinal / self.sectors())
+    }
+
+    /// Makes the next sweep. False at the end of the data, or of what was asked for.
+    fn make<S: Source>(&mut self, source: &mut S) -> Result<bool, ShellError> {
+        let plan = &self.shell.plan;
+        if plan.sweeps.is_some_and(|sweeps| self.ordinal / self.sectors() >= sweeps) {
             return Ok(false);
         }
-        self.cutter.measure(&mut self.whole);
-        self.start_ns = self.pacer.start_ns(self.whole.header.sensor_time_ns, began_ns);
-        self.began_ns = began_ns;
+        let began_ns = clock::now_ns();
+        let (made, next) = self.kept.make(source)?;
+        self.shell.slow_down(Part { sectors: 1, ..Part::default() });
+        if next == Next::End || is_over(self.shell, &made.whole.header) {
+            return Ok(false);
+        }
+        self.cutter.measure(&mut made.whole);
+        made.began_ns = began_ns;
+        made.start_ns = self.pacer.start_ns(made.whole.header.sensor_time_ns, began_ns);
         // One step for the whole sweep. At --pace fast results do not depend on how busy the machine is.
-        self.step = if self.shell.plan.pace == Pace::Realtime { self.shell.page.step.get() as u32 } else { 0 };
+        made.step = if plan.pace == Pace::Realtime { self.shell.page.step.get() as u32 } else { 0 };
+        self.kept.keep();
         Ok(true)
     }
 
     /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep
     /// that has begun is sent to its end, unless the window stays shut or the supervisor is gone.
-    fn send(&mut self, ordinal: u64) -> Result<bool, ShellError> {
+    fn send(&mut self) -> Result<bool, ShellError> {
         let shell = self.shell;
-        let sectors = shell.plan.chain.sectors.max(1);
-        let sector = (ordinal % u64::from(sectors)) as u32;
-        if shell.plan.pace == Pace::Fast {
-            let is_shut = || !self.window.has_room(shell.page.published.get());
-            wait_while(shell, WINDOW_LOOK_NS, is_shut);
-            if is_shut() {
-                return Ok(false);
+        if let Some(window) = &self.window {
+            let is_shut = || !window.has_room(shell.page.published.get(), self.ordinal);
+            wait_while(shell, WINDOW_LOOK_NS, || is_shut() && !self.is_asked_back());
+            if is_shut() || self.is_asked_back() {
+                return Ok(!shell.leaving());
             }
         }
+        let sectors = shell.plan.chain.sectors.max(1);
+        let sector = (self.ordinal % u64::from(sectors)) as u32;
+        let made = self.kept.get(self.ordinal / u64::from(sectors));
         // A sweep's first part had to wait for the sweep to be made.
-        let received_ns = if sector == 0 { self.began_ns } else { clock::now_ns() };
-        shell.page.make_in_hand(ordinal);
+        let received_ns = if sector == 0 { made.began_ns } else { clock::now_ns() };
+        shell.page.make_in_hand(self.ordinal);
         let mut loan = self.sweeps.loan()?;
-        self.cutter.fill(&self.whole, sector, loan.message_mut());
+        self.cutter.fill(&made.whole, sector, loan.message_mut());
         let started_ns = clock::now_ns();
         let due_ns = match shell.plan.pace {
             Pace::Fast => clock::now_ns(),
-            Pace::Realtime => self.start_ns + self.cutter.end_offset_ns(&self.whole, sector),
+            Pace::Realtime => made.start_ns + self.pacer.host_ns(self.cutter.end_offset_ns(&made.whole, sector)),
         };
+        let part = Part {
+            ordinal: self.ordinal,
+            sweep: self.ordinal / u64::from(sectors),
+            sector,
+            sectors,
+            sensor_time_ns: made.whole.header.sensor_time_ns,
+            step: made.step,
+            attempt: shell.page.attempt.get() as u32,
+        };
+        self.trace = Trace { part, due_ns, sweep_start_ns: made.start_ns, ..Trace::default() };
         // What was taken while it was made is the sweep's own time; only its time to leave counts.
         self.taken_by_others.lap_ns();
         self.wait_until(due_ns, || shell.shutdown.orphaned() || (sector == 0 && shell.leaving()));
@@ -141,23 +201,17 @@ impl<'a> Out<'a> {
             shell.page.put_down();
             return Ok(false);
         }
+        self.ordinal += 1;
         if shell.page.swallow.take_one() {
             shell.page.put_down();
             return Ok(true);
         }
-        let part = Part {
-            ordinal,
-            sweep: ordinal / u64::from(sectors),
-            sector,
-            sectors,
-            sensor_time_ns: self.whole.header.sensor_time_ns,
-            step: self.step,
-            reserved: 0,
-        };
-        self.trace = Trace { part, due_ns, sweep_start_ns: self.start_ns, ..Trace::default() };
         let taken_busy_ns = self.taken_by_others.lap_ns();
         self.trace.push(Hop { taken_busy_ns, ..self.hop(received_ns, started_ns) });
         self.publish(loan)?;
+        if part.is_last() {
+            self.tell_truth(part.sweep)?;
+        }
         Ok(true)
     }
 
@@ -188,16 +242,12 @@ impl<'a> Out<'a> {
         Ok(())
     }
 
-    /// Whether the sweep ends after the sensor time that was asked for; the first sweep of the run begins it, whichever
-    /// life of the source made it.
-    fn is_over(&self, header: &SweepHeader) -> bool {
-        let began = &self.shell.page.began_sensor_ns;
-        if began.get() == 0 {
-            began.set(header.sensor_time_ns + 1);
-        }
-        let end_ns = header.sensor_time_ns + header.period_ns;
-        let passed_ns = (end_ns + 1).saturating_sub(began.get());
-        self.shell.plan.duration_ns.is_some_and(|duration_ns| passed_ns > duration_ns)
+    /// Sends what is known of a sweep, with the trace of its last part.
+    fn tell_truth(&mut self, sweep: u64) -> Result<(), ShellError> {
+        let mut truth = self.truths.loan()?;
+        truth.message_mut().copy_from(&self.kept.get(sweep).truth);
+        *truth.trace_mut() = self.trace;
+        Ok(truth.send()?)
     }
 
     /// Sleeps until host time `until_ns`, alive, unless it is to be `cut_short`.
@@ -207,4 +257,16 @@ impl<'a> Out<'a> {
             clock::sleep_until_ns(until_ns.min(clock::now_ns() + LOOK_NS));
         }
     }
+}
+
+/// Whether the sweep ends after the sensor time that was asked for; the first sweep of the run begins it, whichever life
+/// of the source made it.
+fn is_over(shell: &Shell, header: &SweepHeader) -> bool {
+    let began = &shell.page.began_sensor_ns;
+    if began.get() == 0 {
+        began.set(header.sensor_time_ns + 1);
+    }
+    let end_ns = header.sensor_time_ns + header.period_ns;
+    let passed_ns = (end_ns + 1).saturating_sub(began.get());
+    shell.plan.duration_ns.is_some_and(|duration_ns| passed_ns > duration_ns)
 }

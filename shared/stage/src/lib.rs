@@ -68,6 +68,11 @@ pub trait Sink {
     /// Anything but a rejection means that [`Settled`] will be told of the part.
     fn accept(&mut self, trace: &Trace, input: &Self::Input) -> Verdict;
 
+    /// The attempt ([`Part::attempt`]) that is needed because parts are missing, where parts are sent again; else 0.
+    fn wanted_attempt(&self) -> u32 {
+        0
+    }
+
     /// Saves what must outlive a sudden death. Called about once a second.
     fn checkpoint(&mut self) -> Result<(), SinkError>;
 

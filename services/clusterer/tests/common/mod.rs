@@ -16,7 +16,7 @@ use zerocopy::FromZeros;
 
 pub(crate) const METHODS: [Method; 3] = [Method::Auto, Method::Scan, Method::Kdtree];
 pub(crate) const WHOLE: Part =
-    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, reserved: 0 };
+    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
 
 pub(crate) fn room(method: Method, range_d_m: f32) -> Clusterer {
     Clusterer::init(Params { range_d_m, method, min_points: 5 }).unwrap()

@@ -58,6 +58,7 @@ pub fn settings() -> Settings {
         resume: false,
         queue_parts: 4,
         lossless: true,
+        in_order_from: None,
         paced: true,
         deadline_ms: 100.0,
         stages: ["simulator", "clusterer", "extractor", "classifier"].map(str::to_owned).to_vec(),

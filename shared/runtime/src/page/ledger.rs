@@ -83,6 +83,22 @@ impl Page {
         self.in_hand_verdict.set(verdict as u64);
     }
 
+    /// A source goes back to an earlier ordinal. A death on the way is made good by whoever settles it.
+    pub(crate) fn go_back(&self, ordinal: u64) {
+        let again = self.next_ordinal_out.get().saturating_sub(ordinal);
+        self.back_resent.set(self.resent.get() + again);
+        self.back_to.set(ordinal + 1);
+        self.finish_going_back();
+    }
+
+    fn finish_going_back(&self) {
+        if let Some(ordinal) = self.back_to.get().checked_sub(1) {
+            self.resent.set(self.back_resent.get());
+            self.next_ordinal_out.set(ordinal);
+            self.back_to.set(0);
+        }
+    }
+
     /// The part in hand has been sent.
     pub(crate) fn count_sent(&self, part: Part) {
         self.published.add(1);
@@ -169,6 +185,7 @@ impl Page {
     /// A part that was not sent died in hand; a source will make it again, so it is not lost.
     pub fn settle_stage(&self, seen_by_next: u64, in_doubt: bool, is_source: bool) -> Settlement {
         self.finish_gap();
+        self.finish_going_back();
         let mut settlement = Settlement::default();
         let Some(ordinal) = self.in_hand.get().checked_sub(1) else {
             return settlement;

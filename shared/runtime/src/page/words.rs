@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use messages::Verdict;
 
 /// Told apart from any other file, and from pages of another layout.
-pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg2");
+pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg3");
 
 /// Gaps whose ordinals are kept by name; older ones are overwritten, their counts stay.
 pub(super) const MAX_GAPS: usize = 128;
@@ -104,7 +104,7 @@ pub struct Page {
     /// Parts processed, in full or in part.
     pub processed: Word,
     /// Parts rejected, by [`Verdict`].
-    pub rejected: [Word; 8],
+    pub rejected: [Word; Verdict::ALL.len()],
     /// Parts that the stage before published and that overflowed the queue here.
     pub dropped: Word,
     /// Parts that the stage before published and that died with a process.
@@ -113,6 +113,14 @@ pub struct Page {
     pub published: Word,
     /// One more than the last ordinal published (a sink: settled).
     pub next_ordinal_out: Word,
+    /// Source only: how often it went back to send parts again.
+    pub attempt: Word,
+    /// Source only: parts that it had sent and went back behind: `published` is `next_ordinal_out` and these.
+    pub resent: Word,
+    pub(super) back_to: Word,
+    pub(super) back_resent: Word,
+    /// Sink and tape only: the attempt that they need, because parts are missing; fulfilled once the source's is as high.
+    pub wanted_attempt: Word,
     /// Source only: one more than the sensor time of the run's first sweep [ns]; 0 = none yet.
     pub began_sensor_ns: Word,
     /// One more than the ordinal in hand; 0 = none.
