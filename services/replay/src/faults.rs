@@ -27,6 +27,14 @@ pub enum Fault {
     BadRow,
     /// A file ends before the points that it promises, or inside one.
     TornCloud,
+    /// An MCAP file ends inside a record, or goes on as none can: the rest of the file is not read.
+    TornMcap,
+    /// A chunk of an MCAP file that cannot be unpacked, or whose checksum is wrong: it is passed over.
+    BadChunk,
+    /// A message that is not what its channel says; it is passed over.
+    BadMessage,
+    /// The time of a sweep goes back, or on by more than one and a half turns; it is given as it is.
+    ClockStep,
     /// A value of intensity outside 0 to 255, clamped.
     Intensity,
     /// A column of a table with a name that means nothing here.
@@ -39,7 +47,7 @@ pub enum Fault {
 
 impl Fault {
     /// All kinds.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::TornCapture,
         Self::BadFrame,
         Self::NoBlock,
@@ -50,6 +58,10 @@ impl Fault {
         Self::Break,
         Self::BadRow,
         Self::TornCloud,
+        Self::TornMcap,
+        Self::BadChunk,
+        Self::BadMessage,
+        Self::ClockStep,
         Self::Intensity,
         Self::UnknownColumn,
         Self::BadFile,
@@ -69,6 +81,10 @@ impl Fault {
             Self::Break => "break",
             Self::BadRow => "bad_row",
             Self::TornCloud => "torn_cloud",
+            Self::TornMcap => "torn_mcap",
+            Self::BadChunk => "bad_chunk",
+            Self::BadMessage => "bad_message",
+            Self::ClockStep => "clock_step",
             Self::Intensity => "intensity",
             Self::UnknownColumn => "unknown_column",
             Self::BadFile => "bad_file",

@@ -5,7 +5,8 @@ use messages::{Sweep, Truth};
 use stage::{Next, Source, SourceError};
 
 use crate::capture::Capture;
-use crate::cloud::files::Clouds;
+use crate::cloud::files::CloudFiles;
+use crate::cloud::sweeps::Clouds;
 use crate::error::ReplayError;
 use crate::faults::Faults;
 use crate::files;
@@ -74,7 +75,8 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
             Reader::Packets(Box::new(sweeps))
         }
         Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti | Format::Mcap => {
-            Reader::Clouds(Box::new(Clouds::new(files, format, &sensor, limits, &mut faults)?))
+            let source = Box::new(CloudFiles::new(files, format));
+            Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
         }
     };
     Ok(Recording {
@@ -103,7 +105,7 @@ impl Recording {
     pub fn sweeps(&self) -> Option<u64> {
         match &self.reader {
             Reader::Packets(_) => None,
-            Reader::Clouds(clouds) => Some(clouds.len() as u64),
+            Reader::Clouds(clouds) => clouds.len(),
         }
     }
 

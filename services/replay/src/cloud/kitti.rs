@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use super::organise::wrapped;
 use super::{Cloud, Point, intensity};
 use crate::error::{Place, ReplayError};
 use crate::faults::{Fault, Faults};
@@ -14,8 +15,8 @@ const FEWEST: usize = 16;
 const RANGES_M: [f32; 2] = [0.5, 150.0];
 /// Elevations between which it lies [deg]: the HDL-64E sees −24.8 to +2, its corrected clouds and its kin somewhat more.
 const ELEVATIONS_DEG: [f32; 2] = [-40.0, 20.0];
-/// Azimuth within which points follow one another along a ring [deg].
-const NEAR_DEG: f32 = 5.0;
+/// Azimuth within which points follow one another along a ring [rad].
+const NEAR_RAD: f64 = 0.1;
 
 fn values(bytes: &[u8; POINT_BYTES]) -> [f32; 4] {
     std::array::from_fn(|i| f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]))
@@ -30,8 +31,7 @@ pub(crate) fn is_kitti(head: &[u8]) -> bool {
         let [x, y, z, reflectance] = values(bytes);
         let range_m = (x * x + y * y + z * z).sqrt();
         let (azimuth_deg, elevation_deg) = (y.atan2(x).to_degrees(), z.atan2(x.hypot(y)).to_degrees());
-        let apart_deg = (azimuth_deg - before_deg).abs();
-        near += usize::from(apart_deg < NEAR_DEG || apart_deg > 360.0 - NEAR_DEG);
+        near += usize::from(wrapped((azimuth_deg - before_deg).to_radians().into()).abs() < NEAR_RAD);
         before_deg = azimuth_deg;
         // False for NaN too.
         (RANGES_M[0]..RANGES_M[1]).contains(&range_m)

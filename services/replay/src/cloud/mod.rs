@@ -1,6 +1,7 @@
-//! Recordings that hold one sweep a file as a list of points.
+//! Sweeps that are recorded as lists of points.
 
 pub(crate) mod csv;
+pub(crate) mod fields;
 pub(crate) mod files;
 pub(crate) mod kitti;
 mod lzf;
@@ -8,8 +9,12 @@ pub(crate) mod nuscenes;
 mod organise;
 pub(crate) mod pcd;
 pub(crate) mod ply;
+mod ply_header;
+pub(crate) mod source;
+pub(crate) mod sweeps;
+pub(crate) mod value;
 
-/// Points kept of one file. Four times what a sweep holds: those refused count, those beyond are over capacity anyway.
+/// Points kept of one cloud. Four times what a sweep holds: those refused count, those beyond are over capacity anyway.
 const MAX_POINTS: usize = 4 * lidar::MAX_RETURNS;
 
 /// A recorded point.
@@ -26,11 +31,11 @@ pub(crate) struct Point {
     pub(crate) intensity: u8,
 }
 
-/// The points of one file.
+/// The points of one sweep.
 #[derive(Debug, Default)]
 pub(crate) struct Cloud {
     pub(crate) points: Vec<Point>,
-    /// Points of the file that were not kept.
+    /// Points that were not kept.
     pub(crate) beyond: u32,
     pub(crate) has_ring: bool,
     pub(crate) has_key: bool,

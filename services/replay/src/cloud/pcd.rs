@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+use super::value::{Kind, Number};
 use super::{Cloud, Point, intensity, lzf};
 use crate::error::{Place, ReplayError};
 use crate::faults::{Fault, Faults};
@@ -31,13 +32,6 @@ pub(crate) fn is_pcd(head: &[u8]) -> bool {
         .is_some_and(|line| {
             keys.iter().any(|key| line.strip_prefix(key.as_bytes()).is_some_and(|rest| rest.starts_with(b" ")))
         })
-}
-
-/// How a value is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Kind {
-    letter: u8,
-    bytes: usize,
 }
 
 /// A field that is used.
@@ -150,16 +144,15 @@ impl Header {
         let mut fields = [None; NAMES.len()];
         let (mut offset, mut value) = (0_usize, 0_usize);
         for (index, name) in names.iter().enumerate() {
-            let kind = Kind { letter: letters[index], bytes: sizes[index] };
-            if !kind.is_known() {
-                let letter = char::from(kind.letter);
+            let Some(kind) = kind(letters[index], sizes[index]) else {
+                let letter = char::from(letters[index]);
                 let must = "F with 4 or 8, or I or U with 1, 2, 4 or 8";
-                return Err(malformed(format!("field {name} is {letter} with {} bytes, must be {must}", kind.bytes)));
-            }
+                return Err(malformed(format!("field {name} is {letter} with {} bytes, must be {must}", sizes[index])));
+            };
             if counts[index] == 0 {
                 return Err(malformed(format!("COUNT of field {name} is 0, must be at least 1")));
             }
-            let stride = kind.bytes.saturating_mul(counts[index]);
+            let stride = kind.bytes().saturating_mul(counts[index]);
             if let Some(place) = NAMES.iter().position(|known| known == name) {
                 fields[place] = Some(Field { kind, offset, value, stride });
             }
@@ -199,30 +192,25 @@ impl Header {
     }
 }
 
-impl Kind {
-    fn is_known(self) -> bool {
-        match self.letter {
-            b'F' => matches!(self.bytes, 4 | 8),
-            b'I' | b'U' => matches!(self.bytes, 1 | 2 | 4 | 8),
-            _ => false,
-        }
-    }
+/// The kind of a TYPE and SIZE.
+fn kind(letter: u8, bytes: usize) -> Option<Kind> {
+    Some(match (letter, bytes) {
+        (b'F', 4) => Kind::F32,
+        (b'F', 8) => Kind::F64,
+        (b'I', 1) => Kind::I8,
+        (b'I', 2) => Kind::I16,
+        (b'I', 4) => Kind::I32,
+        (b'I', 8) => Kind::I64,
+        (b'U', 1) => Kind::U8,
+        (b'U', 2) => Kind::U16,
+        (b'U', 4) => Kind::U32,
+        (b'U', 8) => Kind::U64,
+        _ => return None,
+    })
+}
 
-    /// The little-endian value that `bytes` begin with; none if they are too short.
-    fn value(self, bytes: &[u8]) -> Option<f64> {
-        let mut wide = [0; 8];
-        wide[..self.bytes].copy_from_slice(bytes.get(..self.bytes)?);
-        let unsigned = u64::from_le_bytes(wide);
-        Some(match (self.letter, self.bytes) {
-            (b'F', 4) => f64::from(f32::from_bits(unsigned as u32)),
-            (b'F', _) => f64::from_bits(unsigned),
-            (b'U', _) => unsigned as f64,
-            _ => {
-                let unused = 64 - 8 * self.bytes as u32;
-                ((unsigned << unused) as i64 >> unused) as f64
-            }
-        })
-    }
+fn float(field: &Field, bytes: &[u8]) -> Option<f64> {
+    field.kind.number(bytes, false).map(Number::float)
 }
 
 /// Keeps the numbering of the file's points.
@@ -297,7 +285,7 @@ fn read_binary(
             Err(source) => return Err(ReplayError::Io { path: path.to_owned(), source }),
         }
         let offset = header.end + got * header.point_bytes as u64;
-        let point = header.point(|field| field.kind.value(memory.bytes.get(field.offset..)?));
+        let point = header.point(|field| float(field, memory.bytes.get(field.offset..)?));
         keep(point, cloud, path, Place::Byte(offset), faults);
         got += 1;
     }
@@ -343,7 +331,7 @@ fn read_compressed(
     for index in 0..header.points {
         let point = header.point(|field| {
             let column = header.points as usize * field.offset;
-            field.kind.value(memory.unpacked.get(column + index as usize * field.stride..)?)
+            float(field, memory.unpacked.get(column + index as usize * field.stride..)?)
         });
         if point.is_none() {
             torn(header, index, cloud, path, Place::Byte(header.end + 8), faults);
@@ -359,18 +347,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_of_every_kind_are_read() {
-        let value = |letter, bytes: &[u8]| Kind { letter, bytes: bytes.len() }.value(bytes);
-        assert_eq!(value(b'F', &1.5_f32.to_le_bytes()), Some(1.5));
-        assert_eq!(value(b'F', &(-2.5_f64).to_le_bytes()), Some(-2.5));
-        assert_eq!(value(b'U', &[200]), Some(200.0));
-        assert_eq!(value(b'I', &[200]), Some(-56.0));
-        assert_eq!(value(b'U', &65_535_u16.to_le_bytes()), Some(65_535.0));
-        assert_eq!(value(b'I', &(-3_i32).to_le_bytes()), Some(-3.0));
-        assert_eq!(value(b'I', &(-3_i64).to_le_bytes()), Some(-3.0));
-        assert_eq!(Kind { letter: b'F', bytes: 4 }.value(&[0; 3]), None);
-        assert!(!Kind { letter: b'F', bytes: 2 }.is_known());
-        assert!(!Kind { letter: b'U', bytes: 9 }.is_known());
+    fn kinds_are_a_letter_and_a_size() {
+        assert_eq!(kind(b'F', 4), Some(Kind::F32));
+        assert_eq!(kind(b'U', 1), Some(Kind::U8));
+        assert_eq!((kind(b'F', 2), kind(b'U', 9)), (None, None));
     }
 
     #[test]
