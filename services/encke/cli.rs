@@ -54,6 +54,9 @@ pub(crate) enum Command {
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
     Doctor(DoctorArgs),
+    /// Show a running chain in the terminal.
+    #[command(after_help = TOP_NOTES)]
+    Top(TopArgs),
 }
 
 const RUN_EXAMPLES: &str = "Examples:
@@ -123,6 +126,15 @@ const INJECT_EXAMPLES: &str = "Faults:
 
 Example:
   encke inject stop clusterer --for 500ms";
+
+const TOP_NOTES: &str = "\
+Looks only: the chain neither waits for it nor knows of it. Where standard output is no terminal, one snapshot is printed.
+Keys: q leaves, tab chooses a panel, enter zooms it, p pauses, ? says more.
+
+Examples:
+  encke top
+  encke top --instance flight-1 --interval 250ms
+  encke top --once --json";
 
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
@@ -419,6 +431,23 @@ pub(crate) struct DoctorArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) chain: Option<PathBuf>,
     /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Options of `encke top`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TopArgs {
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+    /// Between two looks.
+    #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = parse_duration)]
+    pub(crate) interval: Duration,
+    /// Print one snapshot, taken over two intervals, and leave.
+    #[arg(long)]
+    pub(crate) once: bool,
+    /// Print the snapshot as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }

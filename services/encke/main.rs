@@ -16,6 +16,7 @@ mod outputs;
 mod run;
 mod simulate;
 mod sources;
+mod top;
 mod train;
 
 use std::alloc::System;
@@ -78,6 +79,7 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
+        Command::Top(args) => top::top(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,17 @@
+/// Why a viewer could not start or go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MonitorError {
+    /// A file of the instance is not there or not what it should be, or signals cannot be had.
+    #[error(transparent)]
+    Shell(#[from] runtime::ShellError),
+    /// Shared memory failed, or all places for viewers are taken.
+    #[error(transparent)]
+    Transport(#[from] transport::TransportError),
+    /// The terminal failed.
+    #[error("terminal: {0}")]
+    Terminal(std::io::Error),
+    /// Standard output failed.
+    #[error("standard output: {0}")]
+    Output(std::io::Error),
+}

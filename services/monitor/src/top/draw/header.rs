@@ -1,0 +1,85 @@
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::columns::{hundredths, tenths};
+use super::theme;
+use crate::top::ui::Ui;
+use crate::top::view::View;
+
+/// The state of the chain in three lines: what, how, how well.
+pub(in crate::top) fn header_lines(view: &View) -> [String; 3] {
+    let sectors = if view.sectors == 1 { "whole sweeps".to_owned() } else { format!("{} sectors", view.sectors) };
+    let up = view.uptime_s.map_or("down".to_owned(), |s| format!("up {}", clock(s)));
+    let (paced, name) = (view.pace, &view.instance);
+    let first = format!("{name}   {}   {paced}, {sectors}   {up}", short(&view.source));
+    let second = format!("sweep {}   {:.1} sweeps/s   step {}", view.sweep, view.sweeps_per_s, view.step);
+    [first, second, latency(view)]
+}
+
+/// Latency and margin of the last sweeps in a line.
+pub(super) fn latency(view: &View) -> String {
+    let found = &view.latency;
+    if found.sweeps == 0 {
+        return "no sweep answered yet".to_owned();
+    }
+    let times = [found.p50_ms, found.p99_ms, found.max_ms];
+    let words = ["p50", "p99", "max"];
+    let all = |value: &dyn Fn(f64) -> f64| {
+        let parts = words.iter().zip(times).map(|(word, ms)| format!("{word} {}", hundredths(ms.map(value))));
+        parts.collect::<Vec<_>>().join(" ")
+    };
+    let Some(deadline_ms) = found.deadline_ms else { return format!("latency {} ms, no deadline", all(&|ms| ms)) };
+    let margins = times.map(|ms| tenths(ms.map(|ms| deadline_ms - ms))).join(" ");
+    let misses = if found.missed_in_all == 1 { "1 miss".to_owned() } else { format!("{} misses", found.missed_in_all) };
+    format!("latency {} ms   margin to {deadline_ms:.0}: {margins} ms   {misses}", all(&|ms| ms))
+}
+
+pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
+    let [first, second, third] = header_lines(view);
+    let mut top = vec![Span::styled("encke top  ", theme::title(true)), Span::styled(first, theme::strong())];
+    if ui.paused {
+        top.push(Span::styled("  PAUSED ", theme::notice()));
+    }
+    let second = match &view.notice {
+        Some(notice) => Line::styled(format!(" {notice} "), theme::notice()),
+        None if view.step != "nominal" => Line::styled(second, theme::warning()),
+        None => Line::from(second),
+    };
+    let third = if view.latency.missed > 0 { Line::styled(third, theme::alarm()) } else { Line::from(third) };
+    // In the fewest lines the last of them is the one to have.
+    let lines = match area.height {
+        1 if view.notice.is_some() => vec![second],
+        1 => vec![third],
+        _ => vec![Line::from(top), second, third],
+    };
+    frame.render_widget(Paragraph::new(lines), area);
+}
+
+pub(super) fn draw_footer(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
+    let keys =
+        if ui.zoomed { "q quit  enter all panels  ? help" } else { "q quit  tab panel  enter zoom  p pause  ? help" };
+    let seen = match view.tap.missed {
+        0 => String::new(),
+        missed => format!("   unseen here: {missed} parts ({:.1} %)", view.tap.missed_pct()),
+    };
+    let cpu = |process: crate::top::view::ProcessView| tenths(process.cpu_pct);
+    let own = format!("supervisor {} %, this view {} % cpu{seen}", cpu(view.supervisor), cpu(view.viewer));
+    let gap = usize::from(area.width).saturating_sub(keys.chars().count() + own.chars().count());
+    let line = if gap > 0 { format!("{keys}{}{own}", " ".repeat(gap)) } else { keys.to_owned() };
+    frame.render_widget(Paragraph::new(Line::styled(line, theme::faint())), area);
+}
+
+/// The last two members of a path, enough to know it by.
+fn short(path: &str) -> &str {
+    let mut slashes = path.char_indices().rev().filter(|(_, letter)| *letter == '/').map(|(place, _)| place);
+    slashes.nth(1).map_or(path, |place| &path[place + 1..])
+}
+
+/// Minutes and seconds, and hours once there are some.
+pub(super) fn clock(s: f64) -> String {
+    let s = s.max(0.0) as u64;
+    let hours = if s < 3_600 { String::new() } else { format!("{}:", s / 3_600) };
+    format!("{hours}{:02}:{:02}", s / 60 % 60, s % 60)
+}
