@@ -3,7 +3,7 @@
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, TryFromBytes};
 
-use crate::{Bounded, Detections, Message, Sweep, Trace};
+use crate::{Bounded, Clusters, Descriptors, Detections, Message, Sweep, Trace};
 
 /// A message that recordings hold without loss, under the name of its [`Message::TYPE`].
 pub trait Raw: Message {
@@ -76,6 +76,50 @@ impl Raw for Sweep {
         bytes.plain(&mut self.columns)?;
         bytes.plain(&mut self.returns)?;
         bytes.plain(&mut self.recorded_index)?;
+        bytes.end()
+    }
+}
+
+impl Raw for Clusters {
+    fn write_raw(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(self.header.as_bytes());
+        out.extend_from_slice(self.turn_columns.as_bytes());
+        put(out, &self.ring_elevation_rad);
+        put(out, &self.clusters);
+        put(out, &self.returns);
+        put(out, &self.members);
+        put(out, &self.cells);
+    }
+
+    fn read_raw(&mut self, bytes: &[u8]) -> Result<(), RawError> {
+        let mut bytes = Reader { bytes, at: 0 };
+        self.header = bytes.one()?;
+        self.turn_columns = bytes.one()?;
+        bytes.plain(&mut self.ring_elevation_rad)?;
+        bytes.plain(&mut self.clusters)?;
+        bytes.plain(&mut self.returns)?;
+        bytes.plain(&mut self.members)?;
+        bytes.checked(&mut self.cells)?;
+        bytes.end()
+    }
+}
+
+impl Raw for Descriptors {
+    fn write_raw(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(self.header.as_bytes());
+        put(out, &self.descriptors);
+        put(out, &self.members);
+        put(out, &self.bins);
+        put(out, &self.fits);
+    }
+
+    fn read_raw(&mut self, bytes: &[u8]) -> Result<(), RawError> {
+        let mut bytes = Reader { bytes, at: 0 };
+        self.header = bytes.one()?;
+        bytes.plain(&mut self.descriptors)?;
+        bytes.plain(&mut self.members)?;
+        bytes.plain(&mut self.bins)?;
+        bytes.plain(&mut self.fits)?;
         bytes.end()
     }
 }
@@ -183,7 +227,7 @@ mod tests {
     use zerocopy::FromZeros;
 
     use super::*;
-    use crate::{Detection, Solid};
+    use crate::{Bin, Cell, CellKind, Cluster, Descriptor, Detection, Fit, Solid};
 
     fn sweep() -> Box<Sweep> {
         let mut sweep = Sweep::new_box_zeroed().unwrap();
@@ -221,6 +265,24 @@ mod tests {
         again.read_raw(&bytes(&*detections())).unwrap();
         assert_eq!(bytes(&*again), bytes(&*detections()));
         assert_eq!(again.detections[0].class, ObstacleClass::Conical);
+        let mut message = Clusters::new_box_zeroed().unwrap();
+        (message.header.period_ns, message.turn_columns) = (5, 7);
+        message.ring_elevation_rad.push(0.25).unwrap();
+        message.clusters.push(Cluster { cells: 1, ..Cluster::default() }).unwrap();
+        message.returns.push(Return { y: 2.0, ..Return::default() }).unwrap();
+        message.members.push(9).unwrap();
+        message.cells.push(Cell { kind: CellKind::Farther, ..Cell::default() }).unwrap();
+        let mut again = Clusters::new_box_zeroed().unwrap();
+        again.read_raw(&bytes(&*message)).unwrap();
+        assert_eq!((bytes(&*again), again.cells[0].kind), (bytes(&*message), CellKind::Farther));
+        let mut message = Descriptors::new_box_zeroed().unwrap();
+        message.descriptors.push(Descriptor { bins: 1, ..Descriptor::default() }).unwrap();
+        message.members.push(3).unwrap();
+        message.bins.push(Bin { index: 4, weight: 1.0 }).unwrap();
+        message.fits.push(Fit { hits: 6, ..Fit::default() }).unwrap();
+        let mut again = Descriptors::new_box_zeroed().unwrap();
+        again.read_raw(&bytes(&*message)).unwrap();
+        assert_eq!((bytes(&*again), again.fits[0].hits), (bytes(&*message), 6));
     }
 
     #[test]
