@@ -1,1 +1,53 @@
 //! What the chain says, kept in MCAP files: lossless for replay, in Foxglove's schemas for people.
+//!
+//! [`Tape`] takes parts of messages as they come, joins them and writes files; see the room's note for what they hold.
+//! It reads no clock, starts no thread and makes nobody wait. [`Clouds`], [`Scenes`], [`DetectionsJoiner`] and
+//! [`colour`] serve whoever else shows a sweep.
+//!
+//! ```
+//! use messages::{Detections, Sweep, Trace};
+//! use tape::{About, Tape, TapeFile, Topic};
+//! use zerocopy::FromZeros;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let file: TapeFile = toml::from_str(include_str!("../../../config/tape.toml"))?;
+//! let utc_ns = 1_700_000_000_000_000_000;
+//! let mut tape = Tape::start(file.checked()?, &folder.path().join("run.mcap"), About::default(), None, utc_ns)?;
+//! let (sweep, detections) = (Sweep::new_box_zeroed().unwrap(), Detections::new_box_zeroed().unwrap());
+//! tape.sweep(utc_ns, &Trace::default(), &sweep);
+//! tape.detections(utc_ns, &Trace::default(), &detections);
+//! tape.finish(utc_ns)?;
+//! assert_eq!(tape.counts().of(Topic::Clusters).unwrap().messages, 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod cloud;
+mod colours;
+mod counts;
+mod hold;
+mod joiner;
+mod names;
+mod reel;
+mod reels;
+mod scene;
+mod schemas;
+mod settings;
+mod sink;
+mod stamps;
+mod stream;
+mod tape;
+mod topic;
+mod words;
+
+pub use cloud::{Clouds, Clustered, FRAME_ID, NO_CLUSTER};
+pub use colours::{CONICAL, CYLINDRICAL, ELLIPSOIDAL, RECTANGULAR, UNCLASSIFIED, colour};
+pub use counts::{Counts, TopicCounts};
+pub use joiner::DetectionsJoiner;
+pub use reel::About;
+pub use scene::{CENTROID_M, Scenes};
+pub use settings::{
+    Compression, MAX_CHUNK_KIB, MAX_HOLD_SWEEPS, Settings, SettingsError, TapeError, TapeFile, WhenFull,
+};
+pub use tape::Tape;
+pub use topic::Topic;
+pub use words::{Event, Level};

@@ -1,0 +1,3 @@
+//! What a sweep costs.
+
+fn main() {}

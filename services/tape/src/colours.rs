@@ -1,0 +1,28 @@
+//! One colour a class, the same wherever obstacles are shown.
+//!
+//! From the palette of Okabe and Ito (Color Universal Design, 2008), whose colours stay apart for all kinds of colour
+//! vision; those that are bright enough for a dark ground.
+
+use lidar::ObstacleClass;
+
+/// Sky blue: boxes. Red, green, blue, 0 to 255.
+pub const RECTANGULAR: [u8; 3] = [86, 180, 233];
+/// Orange: ellipsoids.
+pub const ELLIPSOIDAL: [u8; 3] = [230, 159, 0];
+/// Bluish green: cylinders.
+pub const CYLINDRICAL: [u8; 3] = [0, 158, 115];
+/// Vermilion: cones.
+pub const CONICAL: [u8; 3] = [213, 94, 0];
+/// Grey: no class.
+pub const UNCLASSIFIED: [u8; 3] = [153, 153, 153];
+
+/// The colour of a class: red, green, blue, 0 to 255.
+pub const fn colour(class: ObstacleClass) -> [u8; 3] {
+    match class {
+        ObstacleClass::Rectangular => RECTANGULAR,
+        ObstacleClass::Ellipsoidal => ELLIPSOIDAL,
+        ObstacleClass::Cylindrical => CYLINDRICAL,
+        ObstacleClass::Conical => CONICAL,
+        ObstacleClass::Unclassified => UNCLASSIFIED,
+    }
+}

@@ -1,0 +1,290 @@
+//! The files of a run: begun, turned over by size and age, removed for the quota, closed by an error and tried again.
+
+use std::collections::VecDeque;
+use std::fs::OpenOptions;
+use std::io;
+use std::os::unix::fs::FileTypeExt;
+use std::path::{Path, PathBuf};
+
+use crate::Topic;
+use crate::counts::{Tally, add};
+use crate::names::{is_ours, numbered, present};
+use crate::reel::{About, Closed, Reel, Stamps};
+use crate::settings::{Settings, TapeError, WhenFull};
+use crate::sink::Target;
+
+/// Creates a file of the run, or empties it.
+pub(crate) type Open = Box<dyn Fn(&Path) -> io::Result<Box<dyn Target>> + Send>;
+
+/// Opens files of the file system.
+pub(crate) fn on_disk() -> Open {
+    Box::new(|path| Ok(Box::new(OpenOptions::new().write(true).create(true).truncate(true).open(path)?)))
+}
+
+/// A file of the run that is no longer written.
+struct Kept {
+    path: PathBuf,
+    bytes: u64,
+    messages: Tally,
+}
+
+/// What is being written.
+enum State {
+    /// A file, begun at a host time [ns].
+    Writing(Box<Reel>, u64),
+    /// Nothing until a host time [ns], because of an error; nothing ever again without one.
+    Failed(Option<u64>),
+    /// Nothing ever again: the quota is used up.
+    Full,
+}
+
+/// The run's files.
+pub(crate) struct Reels {
+    settings: Settings,
+    path: PathBuf,
+    about: About,
+    open: Open,
+    state: State,
+    /// Of the latest file.
+    number: u64,
+    /// Whether the latest file was left without a message, so that its number is used again.
+    empty: bool,
+    /// Whether nothing was written since the latest error.
+    failing: bool,
+    /// Files that the quota counts, the oldest first; not the one being written.
+    kept: VecDeque<Kept>,
+    /// Whether there can be more than one file: not where the path is a device.
+    regular: bool,
+    pub(crate) files: u64,
+    pub(crate) removed_files: u64,
+    pub(crate) failure: Option<String>,
+    /// Of files that are closed and there.
+    written: Tally,
+    pub(crate) removed: Tally,
+    pub(crate) lost: Tally,
+    closed_bytes: u64,
+}
+
+impl Reels {
+    /// Begins the run's first file, or with `resume` the one after those that are there.
+    pub(crate) fn start(
+        settings: Settings,
+        path: &Path,
+        about: About,
+        resume: bool,
+        open: Open,
+        utc_ns: u64,
+    ) -> Result<Self, TapeError> {
+        let create = |source| TapeError::Create { path: path.to_owned(), source };
+        let kind = std::fs::metadata(path).map(|metadata| metadata.file_type());
+        if kind.as_ref().is_ok_and(|kind| kind.is_fifo() || kind.is_socket()) {
+            return Err(TapeError::NoFile(path.to_owned()));
+        }
+        let regular = kind.as_ref().map_or(true, |kind| kind.is_file() || kind.is_dir());
+        let mut reels = Self {
+            settings,
+            path: path.to_owned(),
+            about,
+            open,
+            state: State::Failed(None),
+            number: 0,
+            empty: true,
+            failing: false,
+            kept: VecDeque::new(),
+            regular,
+            files: 0,
+            removed_files: 0,
+            failure: None,
+            written: Tally::default(),
+            removed: Tally::default(),
+            lost: Tally::default(),
+            closed_bytes: 0,
+        };
+        if regular {
+            reels.look(resume).map_err(create)??;
+        }
+        // What cannot even be opened is refused; what cannot be written is an event, as later on.
+        let target = (reels.open)(&numbered(path, reels.number)).map_err(create)?;
+        reels.begin(target, utc_ns);
+        Ok(reels)
+    }
+
+    /// Finds the files of earlier lives to go on after, or clears an earlier run's out of the way.
+    fn look(&mut self, resume: bool) -> io::Result<Result<(), TapeError>> {
+        for number in present(&self.path)? {
+            let path = numbered(&self.path, number);
+            if number > 0 && !is_ours(&path)? {
+                return Ok(Err(TapeError::Foreign { path: self.path.clone(), other: path }));
+            }
+            if resume {
+                let bytes = path.metadata()?.len();
+                self.kept.push_back(Kept { path, bytes, messages: Tally::default() });
+                self.number = number + 1;
+            } else if number > 0 {
+                std::fs::remove_file(path)?;
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    fn begin(&mut self, target: Box<dyn Target>, utc_ns: u64) {
+        self.files += u64::from(self.files == 0 || !self.empty);
+        match Reel::begin(target, &self.settings, &self.about, self.number) {
+            Ok(reel) => self.state = State::Writing(Box::new(reel), utc_ns),
+            Err(error) => self.fail(Closed::default(), &error, utc_ns),
+        }
+    }
+
+    /// Writes a message, or counts it as lost.
+    pub(crate) fn write(&mut self, topic: Topic, stamps: &Stamps, data: &[u8]) {
+        self.turn(stamps.utc_ns);
+        let State::Writing(reel, _) = &mut self.state else {
+            self.lost[topic as usize] += 1;
+            return;
+        };
+        let written = reel.write(&self.settings, topic, stamps, data);
+        let full = reel.open_bytes() >= self.settings.chunk_bytes;
+        if let Err(error) = written {
+            self.close_failed(&error, stamps.utc_ns);
+        } else if full {
+            self.commit(stamps.utc_ns);
+        }
+    }
+
+    /// Hands all that was written to the system.
+    pub(crate) fn commit(&mut self, utc_ns: u64) {
+        let State::Writing(reel, _) = &mut self.state else { return };
+        if let Err(error) = reel.commit() {
+            self.close_failed(&error, utc_ns);
+            return;
+        }
+        if self.failing && *reel.committed() != Tally::default() {
+            self.failing = false;
+            tracing::info!(file = %numbered(&self.path, self.number).display(), "recording goes on");
+        }
+        self.keep_quota(utc_ns);
+    }
+
+    /// Whether messages wait to be handed to the system.
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(&self.state, State::Writing(reel, _) if reel.open_bytes() > 0)
+    }
+
+    /// Ends the file being written; false where that fails.
+    pub(crate) fn finish(&mut self, utc_ns: u64) -> bool {
+        let State::Writing(reel, _) = std::mem::replace(&mut self.state, State::Failed(None)) else { return true };
+        let (closed, result) = reel.finish();
+        match result {
+            Ok(()) => self.keep(closed),
+            Err(error) => {
+                self.fail(closed, &error, utc_ns);
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Begins the next file where it is time for it.
+    fn turn(&mut self, utc_ns: u64) {
+        let due = match &self.state {
+            State::Writing(reel, begun_ns) => {
+                let old = self.settings.rotate_ns.is_some_and(|age| utc_ns.saturating_sub(*begun_ns) >= age);
+                let large = self.settings.rotate_bytes.is_some_and(|most| reel.bytes() >= most);
+                self.regular && (old || large)
+            }
+            State::Failed(again_ns) => again_ns.is_some_and(|again_ns| utc_ns >= again_ns),
+            State::Full => false,
+        };
+        if !due || !self.finish(utc_ns) {
+            return;
+        }
+        self.number += u64::from(!self.empty);
+        match (self.open)(&numbered(&self.path, self.number)) {
+            Ok(target) => self.begin(target, utc_ns),
+            Err(error) => self.fail(Closed::default(), &error, utc_ns),
+        }
+    }
+
+    fn close_failed(&mut self, error: &io::Error, utc_ns: u64) {
+        if let State::Writing(reel, _) = std::mem::replace(&mut self.state, State::Failed(None)) {
+            self.fail(reel.give_up(), error, utc_ns);
+        }
+    }
+
+    /// Waits for another attempt. Tells the first error of several in a row.
+    fn fail(&mut self, closed: Closed, error: &io::Error, utc_ns: u64) {
+        add(&mut self.lost, &closed.lost);
+        self.keep(closed);
+        let path = numbered(&self.path, self.number);
+        if !std::mem::replace(&mut self.failing, true) {
+            tracing::error!(file = %path.display(), %error, "recording closed, what it should hold is lost from here on");
+        }
+        self.failure = Some(format!("{}: {error}", path.display()));
+        let again = self.settings.retry_ns.filter(|_| self.regular);
+        self.state = State::Failed(again.map(|span_ns| utc_ns.saturating_add(span_ns)));
+    }
+
+    fn keep(&mut self, closed: Closed) {
+        add(&mut self.written, &closed.messages);
+        self.closed_bytes += closed.bytes;
+        self.empty = closed.messages == Tally::default();
+        if !self.empty {
+            let path = numbered(&self.path, self.number);
+            self.kept.push_back(Kept { path, bytes: closed.bytes, messages: closed.messages });
+        }
+    }
+
+    fn keep_quota(&mut self, utc_ns: u64) {
+        let Some(quota) = self.settings.quota_bytes.filter(|_| self.regular) else { return };
+        let now = |reels: &Self| reels.current_bytes() + reels.kept.iter().map(|kept| kept.bytes).sum::<u64>();
+        while now(self) > quota {
+            if self.settings.when_full == WhenFull::Stop {
+                self.finish(utc_ns);
+                self.state = State::Full;
+                tracing::warn!(file = %self.path.display(), "recording ends, its quota is used up");
+                return;
+            }
+            let Some(oldest) = self.kept.pop_front() else { return };
+            match std::fs::remove_file(&oldest.path) {
+                Ok(()) => tracing::info!(file = %oldest.path.display(), "oldest recording removed for the quota"),
+                Err(error) => {
+                    tracing::warn!(file = %oldest.path.display(), %error, "cannot remove the oldest recording")
+                }
+            }
+            self.removed_files += 1;
+            add(&mut self.removed, &oldest.messages);
+            for (written, removed) in self.written.iter_mut().zip(&oldest.messages) {
+                *written = written.saturating_sub(*removed);
+            }
+        }
+    }
+
+    fn current_bytes(&self) -> u64 {
+        match &self.state {
+            State::Writing(reel, _) => reel.bytes(),
+            _ => 0,
+        }
+    }
+
+    /// Bytes of all files of this life, removed ones included.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.closed_bytes + self.current_bytes()
+    }
+
+    /// Messages of this life in files that are there.
+    pub(crate) fn messages(&self) -> Tally {
+        let mut sum = self.written;
+        if let State::Writing(reel, _) = &self.state {
+            add(&mut sum, reel.committed());
+        }
+        sum
+    }
+
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}

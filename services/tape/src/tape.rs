@@ -1,0 +1,384 @@
+//! The recording: what comes in parts is joined, what belongs together is brought together, all of it goes to files.
+
+use std::path::Path;
+
+use messages::{Clusters, Descriptors, Detections, Joiner, Raw, Sweep, Trace, Truth};
+
+use crate::cloud::{Clouds, Clustered};
+use crate::counts::{Counts, TopicCounts};
+use crate::hold::Hold;
+use crate::joiner::DetectionsJoiner;
+use crate::reel::{About, Stamps};
+use crate::reels::{Open, Reels, on_disk};
+use crate::scene::Scenes;
+use crate::settings::{Settings, TapeError};
+use crate::stream::Stream;
+use crate::topic::Topic;
+use crate::words::{Event, put_event, put_truth};
+
+/// Events and states that wait for the first sweep to learn the sensor's time.
+const MOST_EARLY: usize = 256;
+
+/// What of a sweep waits for its detections.
+#[derive(Default)]
+struct Echoes {
+    sensor_time_ns: u64,
+    returns: Vec<lidar::Return>,
+    recorded_index: Vec<u32>,
+}
+
+/// What of a sweep's detections waits for its returns.
+#[derive(Default)]
+struct Verdicts {
+    detections: Vec<messages::Detection>,
+    members: Vec<u32>,
+}
+
+/// A message that waits for the sensor's time.
+struct Early {
+    topic: Topic,
+    utc_ns: u64,
+    event: Option<(crate::Level, String, String)>,
+    json: Vec<u8>,
+}
+
+/// A recording being written. Host time (UTC) comes with every call; nothing is read here but files.
+pub struct Tape {
+    reels: Reels,
+    sweeps: Stream,
+    joiner: Joiner,
+    detections: Stream,
+    detections_joiner: DetectionsJoiner,
+    truths: Stream,
+    /// Parts by ordinal.
+    raw_clusters: Stream,
+    raw_descriptors: Stream,
+    echoes: Hold<Echoes>,
+    verdicts: Hold<Verdicts>,
+    /// Sweeps written with their clusters.
+    paired: u64,
+    first_sweep: u64,
+    clouds: Clouds,
+    scenes: Scenes,
+    buffer: Vec<u8>,
+    early: Vec<Early>,
+    /// Sensor time of the newest sweep [ns].
+    sensor_time_ns: Option<u64>,
+    events: u32,
+    states: u32,
+    /// Of the latest commit.
+    done_sweeps: u64,
+}
+
+impl Tape {
+    /// Begins a recording. What cannot be opened is refused; what cannot be written is an event, then as later.
+    ///
+    /// `resume` is for the successor of a process that was killed: the sweep from which on nothing is in the files of
+    /// the lives before ([`Tape::done_sweeps`] of the latest). Their files are left as they are, and the next number is
+    /// begun. Without it the path, and numbered files of an earlier run of that name, are overwritten.
+    pub fn start(
+        settings: Settings,
+        path: &Path,
+        about: About,
+        resume: Option<u64>,
+        utc_ns: u64,
+    ) -> Result<Self, TapeError> {
+        Self::start_with(settings, path, about, resume, on_disk(), utc_ns)
+    }
+
+    pub(crate) fn start_with(
+        settings: Settings,
+        path: &Path,
+        about: About,
+        resume: Option<u64>,
+        open: Open,
+        utc_ns: u64,
+    ) -> Result<Self, TapeError> {
+        let first = resume.unwrap_or(0);
+        let first_part = first.saturating_mul(about.sectors.into());
+        let hold = settings.hold_sweeps;
+        Ok(Self {
+            sweeps: Stream::new(first),
+            joiner: Joiner::new().ok_or(TapeError::Memory)?,
+            detections: Stream::new(first),
+            detections_joiner: DetectionsJoiner::new().ok_or(TapeError::Memory)?,
+            truths: Stream::new(first),
+            raw_clusters: Stream::new(first_part),
+            raw_descriptors: Stream::new(first_part),
+            echoes: Hold::new(hold),
+            verdicts: Hold::new(hold),
+            paired: 0,
+            first_sweep: first,
+            clouds: Clouds::default(),
+            scenes: Scenes::default(),
+            buffer: Vec::new(),
+            early: Vec::new(),
+            sensor_time_ns: None,
+            events: 0,
+            states: 0,
+            done_sweeps: first,
+            reels: Reels::start(settings, path, about, resume.is_some(), open, utc_ns)?,
+        })
+    }
+
+    /// Takes a part of a sweep, as the source sends it. The sweep is written with its last part.
+    pub fn sweep(&mut self, utc_ns: u64, trace: &Trace, piece: &Sweep) {
+        let part = &trace.part;
+        self.hear(piece.header.sensor_time_ns);
+        if !self.sweeps.takes(part.sweep) {
+            return;
+        }
+        let Some(whole) = self.joiner.add(part, piece) else { return };
+        self.sweeps.end(part.sweep);
+        let sensor_time_ns = whole.header.sensor_time_ns;
+        let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: part.sweep as u32 };
+        if self.reels.settings().has(Topic::RawSweep) {
+            self.buffer.clear();
+            whole.write_raw(&mut self.buffer);
+            self.reels.write(Topic::RawSweep, &stamps, &self.buffer);
+        }
+        if self.reels.settings().has(Topic::Sweep) {
+            self.buffer.clear();
+            self.clouds.sweep(whole, &mut self.buffer);
+            self.reels.write(Topic::Sweep, &stamps, &self.buffer);
+        }
+        if !self.reels.settings().has(Topic::Clusters) {
+            return;
+        }
+        let (returns, recorded_index) = (&whole.returns[..], &whole.recorded_index[..]);
+        if let Some(Verdicts { detections, members }) = self.verdicts.get(part.sweep) {
+            let of = Clustered { sensor_time_ns, returns, recorded_index, detections, members };
+            self.buffer.clear();
+            if self.clouds.clusters(&of, &mut self.buffer) {
+                self.reels.write(Topic::Clusters, &stamps, &self.buffer);
+                self.paired += 1;
+            }
+        } else if self.detections.next() <= part.sweep {
+            let echoes = self.echoes.put(part.sweep);
+            echoes.sensor_time_ns = sensor_time_ns;
+            refill(&mut echoes.returns, returns);
+            refill(&mut echoes.recorded_index, recorded_index);
+        }
+    }
+
+    /// Takes a part of a sweep's detections, as the last stage sends it. They are written with the last part; those of
+    /// an earlier sweep that have not come by then are given up.
+    pub fn detections(&mut self, utc_ns: u64, trace: &Trace, piece: &Detections) {
+        let part = &trace.part;
+        self.hear(piece.header.sensor_time_ns);
+        if !self.detections.takes(part.sweep) {
+            return;
+        }
+        let Some(whole) = self.detections_joiner.add(part, piece) else { return };
+        self.detections.end(part.sweep);
+        let stamps = Stamps { log_time_ns: whole.header.sensor_time_ns, utc_ns, sequence: part.sweep as u32 };
+        if self.reels.settings().has(Topic::RawDetections) {
+            self.buffer.clear();
+            trace.write_raw(&mut self.buffer);
+            whole.write_raw(&mut self.buffer);
+            self.reels.write(Topic::RawDetections, &stamps, &self.buffer);
+        }
+        if self.reels.settings().has(Topic::Detections) {
+            self.buffer.clear();
+            self.scenes.detections(whole, &mut self.buffer);
+            self.reels.write(Topic::Detections, &stamps, &self.buffer);
+        }
+        if !self.reels.settings().has(Topic::Clusters) {
+            return;
+        }
+        let (detections, members) = (&whole.detections[..], &whole.members[..]);
+        if let Some(Echoes { sensor_time_ns, returns, recorded_index }) = self.echoes.get(part.sweep) {
+            let of = Clustered { sensor_time_ns: *sensor_time_ns, returns, recorded_index, detections, members };
+            self.buffer.clear();
+            if self.clouds.clusters(&of, &mut self.buffer) {
+                self.reels.write(Topic::Clusters, &stamps, &self.buffer);
+                self.paired += 1;
+            }
+        } else if self.sweeps.next() <= part.sweep {
+            let verdicts = self.verdicts.put(part.sweep);
+            refill(&mut verdicts.detections, detections);
+            refill(&mut verdicts.members, members);
+        }
+    }
+
+    /// Takes what the simulator knows of a sweep.
+    pub fn truth(&mut self, utc_ns: u64, trace: &Trace, truth: &Truth) {
+        let sweep = trace.part.sweep;
+        self.hear(truth.sensor_time_ns);
+        if !self.reels.settings().has(Topic::Truth) || !self.truths.takes(sweep) {
+            return;
+        }
+        self.truths.end(sweep);
+        self.buffer.clear();
+        put_truth(sweep, truth, &mut self.buffer);
+        let stamps = Stamps { log_time_ns: truth.sensor_time_ns, utc_ns, sequence: sweep as u32 };
+        self.reels.write(Topic::Truth, &stamps, &self.buffer);
+    }
+
+    /// Takes a part of the clusters, as the clusterer sends it; written as it comes.
+    pub fn clusters(&mut self, utc_ns: u64, trace: &Trace, piece: &Clusters) {
+        self.hear(piece.header.sensor_time_ns);
+        if self.reels.settings().has(Topic::RawClusters) && self.raw_clusters.takes(trace.part.ordinal) {
+            self.raw_clusters.end(trace.part.ordinal);
+            self.raw_part(Topic::RawClusters, utc_ns, trace, piece.header.sensor_time_ns, piece);
+        }
+    }
+
+    /// Takes a part of the descriptors, as the extractor sends it; written as it comes.
+    pub fn descriptors(&mut self, utc_ns: u64, trace: &Trace, piece: &Descriptors) {
+        self.hear(piece.header.sensor_time_ns);
+        if self.reels.settings().has(Topic::RawDescriptors) && self.raw_descriptors.takes(trace.part.ordinal) {
+            self.raw_descriptors.end(trace.part.ordinal);
+            self.raw_part(Topic::RawDescriptors, utc_ns, trace, piece.header.sensor_time_ns, piece);
+        }
+    }
+
+    fn raw_part(&mut self, topic: Topic, utc_ns: u64, trace: &Trace, sensor_time_ns: u64, piece: &impl Raw) {
+        self.buffer.clear();
+        trace.write_raw(&mut self.buffer);
+        piece.write_raw(&mut self.buffer);
+        let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: trace.part.sweep as u32 };
+        self.reels.write(topic, &stamps, &self.buffer);
+    }
+
+    /// Takes what `encke ctl status --json` says. Before the first sweep it waits, to be stamped with sensor time.
+    pub fn status(&mut self, utc_ns: u64, json: &[u8]) {
+        let Some(sensor_time_ns) = self.sensor_time_ns else {
+            self.wait(Early { topic: Topic::Status, utc_ns, event: None, json: json.to_vec() });
+            return;
+        };
+        if self.reels.settings().has(Topic::Status) {
+            let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: self.states };
+            self.states = self.states.wrapping_add(1);
+            self.reels.write(Topic::Status, &stamps, json);
+        }
+    }
+
+    /// Takes something that happened. Before the first sweep it waits, to be stamped with sensor time.
+    pub fn event(&mut self, utc_ns: u64, event: &Event<'_>) {
+        let Some(sensor_time_ns) = self.sensor_time_ns else {
+            let event = Some((event.level, event.name.into(), event.message.into()));
+            self.wait(Early { topic: Topic::Events, utc_ns, event, json: Vec::new() });
+            return;
+        };
+        if self.reels.settings().has(Topic::Events) {
+            self.buffer.clear();
+            put_event(event, sensor_time_ns, &mut self.buffer);
+            let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: self.events };
+            self.events = self.events.wrapping_add(1);
+            self.reels.write(Topic::Events, &stamps, &self.buffer);
+        }
+    }
+
+    fn wait(&mut self, early: Early) {
+        if !self.reels.settings().has(early.topic) {
+            return;
+        }
+        if self.early.len() < MOST_EARLY {
+            self.early.push(early);
+        } else {
+            self.reels.lost[early.topic as usize] += 1;
+        }
+    }
+
+    /// Learns the sensor's time, and writes what has waited for it.
+    fn hear(&mut self, sensor_time_ns: u64) {
+        let first = self.sensor_time_ns.is_none();
+        self.sensor_time_ns = self.sensor_time_ns.max(Some(sensor_time_ns));
+        if first {
+            self.write_early();
+        }
+    }
+
+    fn write_early(&mut self) {
+        for Early { utc_ns, event, json, .. } in std::mem::take(&mut self.early) {
+            match event {
+                Some((level, name, message)) => self.event(utc_ns, &Event { level, name: &name, message: &message }),
+                None => self.status(utc_ns, &json),
+            }
+        }
+    }
+
+    /// Hands what was written to the system: a kill loses nothing of it. To be called about once a second, and at
+    /// lossless pace whenever nothing more is there to take.
+    pub fn checkpoint(&mut self, utc_ns: u64) {
+        self.reels.commit(utc_ns);
+        self.done_sweeps = self.settled();
+    }
+
+    /// All sweeps below this number are in the system's hands with all that is written of a sweep, or were given up.
+    /// Truth and raw parts in between do not count. Rises with [`Tape::checkpoint`], and where a chunk has ended.
+    pub fn done_sweeps(&mut self) -> u64 {
+        if !self.reels.is_open() {
+            self.done_sweeps = self.settled();
+        }
+        self.done_sweeps
+    }
+
+    fn settled(&self) -> u64 {
+        let has = |topics: &[Topic]| topics.iter().any(|&topic| self.reels.settings().has(topic));
+        let sweeps = has(&[Topic::RawSweep, Topic::Sweep, Topic::Clusters]).then_some(self.sweeps.next());
+        let detections =
+            has(&[Topic::RawDetections, Topic::Detections, Topic::Clusters]).then_some(self.detections.next());
+        match (sweeps, detections) {
+            (Some(one), Some(other)) => one.min(other),
+            (one, other) => one.or(other).unwrap_or(u64::MAX),
+        }
+    }
+
+    /// What is in the files and what is lost, as of the latest commit; what is in an open chunk is in neither.
+    pub fn counts(&self) -> Counts {
+        let reels = &self.reels;
+        let (messages, paired_below) = (reels.messages(), self.sweeps.next().min(self.detections.next()));
+        let count = |&topic: &Topic| {
+            let never_came = match topic {
+                Topic::Sweep | Topic::RawSweep => self.sweeps.lost(),
+                Topic::Detections | Topic::RawDetections => self.detections.lost(),
+                Topic::Clusters => (paired_below - self.first_sweep).saturating_sub(self.paired),
+                Topic::Truth => self.truths.lost(),
+                Topic::RawClusters => self.raw_clusters.lost(),
+                Topic::RawDescriptors => self.raw_descriptors.lost(),
+                Topic::Events | Topic::Status => 0,
+            };
+            TopicCounts {
+                topic: topic.name().into(),
+                messages: messages[topic as usize],
+                removed: reels.removed[topic as usize],
+                lost: reels.lost[topic as usize] + never_came,
+            }
+        };
+        let streams = [&self.sweeps, &self.detections, &self.truths, &self.raw_clusters, &self.raw_descriptors];
+        Counts {
+            topics: reels.settings().topics().iter().map(count).collect(),
+            files: reels.files,
+            removed_files: reels.removed_files,
+            bytes: reels.bytes(),
+            doubles: streams.iter().map(|stream| stream.doubles()).sum(),
+            failure: reels.failure.clone(),
+        }
+    }
+
+    /// Gives up what has not come, completes the file and closes it. Nothing is to be handed over afterwards. An error
+    /// where a write error cost messages; [`Tape::counts`] says more.
+    pub fn finish(&mut self, utc_ns: u64) -> Result<(), TapeError> {
+        let seen = self.sweeps.seen().max(self.detections.seen());
+        self.sweeps.give_up_below(seen);
+        self.detections.give_up_below(seen);
+        self.sensor_time_ns.get_or_insert(0);
+        self.write_early();
+        self.reels.finish(utc_ns);
+        self.done_sweeps = self.settled();
+        let lost = self.reels.lost.iter().sum();
+        match &self.reels.failure {
+            Some(failure) => {
+                Err(TapeError::Incomplete { path: self.reels.path().to_owned(), failure: failure.clone(), lost })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn refill<T: Copy>(to: &mut Vec<T>, from: &[T]) {
+    to.clear();
+    to.extend_from_slice(from);
+}
