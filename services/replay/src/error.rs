@@ -97,6 +97,14 @@ pub enum ReplayError {
         /// What is found, what must be, and what to do.
         what: String,
     },
+    /// It is not clear which topic of an MCAP file to read, or it has none that holds sweeps.
+    #[error("{}: {what}", path.display())]
+    Topic {
+        /// The file.
+        path: PathBuf,
+        /// What is found, what must be, and what to do.
+        what: String,
+    },
     /// The range limits contradict each other.
     #[error(
         "range limits are {near_m} to {far_m} m, must be 0 or more, finite and rising; change --min-range or --max-range"

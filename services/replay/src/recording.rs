@@ -12,6 +12,7 @@ use crate::faults::Faults;
 use crate::files;
 use crate::format::Format;
 use crate::intake::Limits;
+use crate::mcap::{Kind, MessageClouds, Messages, RawSweeps};
 use crate::velodyne::{Sweeps, check_rate};
 
 /// What the caller may say of a recording. Everything else is found in it.
@@ -52,11 +53,12 @@ pub struct Recording {
 enum Reader {
     Packets(Box<Sweeps>),
     Clouds(Box<Clouds>),
+    Raw(Box<RawSweeps>),
 }
 
 /// Opens a recording: a file, or a folder of files in name order. The format is found by content.
 ///
-/// Packets are read as they are needed; of clouds one file is read ahead.
+/// Packets and messages are read as they are needed; of clouds one is read ahead.
 ///
 /// # Errors
 /// One line that names file, place and remedy: [`ReplayError`].
@@ -74,7 +76,20 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
             let sweeps = Sweeps::new(Capture::new(files), &sensor, limits, options.both_returns)?;
             Reader::Packets(Box::new(sweeps))
         }
-        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti | Format::Mcap => {
+        Format::Mcap => {
+            let messages = Messages::open(files, options.topic.as_deref())?;
+            match messages.kind() {
+                Kind::Raw => {
+                    let is_asked = options.min_range_m.is_some() || options.max_range_m.is_some();
+                    Reader::Raw(Box::new(RawSweeps::new(messages, is_asked.then_some(limits))?))
+                }
+                Kind::PointCloud2 | Kind::PointCloud2Ros1 | Kind::Foxglove => {
+                    let source = Box::new(MessageClouds::new(messages));
+                    Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
+                }
+            }
+        }
+        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti => {
             let source = Box::new(CloudFiles::new(files, format));
             Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
         }
@@ -104,7 +119,7 @@ impl Recording {
     /// Sweeps in one pass, where that is known before reading: one a file. Files that cannot be read count too.
     pub fn sweeps(&self) -> Option<u64> {
         match &self.reader {
-            Reader::Packets(_) => None,
+            Reader::Packets(_) | Reader::Raw(_) => None,
             Reader::Clouds(clouds) => clouds.len(),
         }
     }
@@ -118,6 +133,7 @@ impl Recording {
         match &mut self.reader {
             Reader::Packets(sweeps) => sweeps.next(sweep, &mut self.faults),
             Reader::Clouds(clouds) => Ok(clouds.next(sweep, &mut self.faults)),
+            Reader::Raw(sweeps) => Ok(sweeps.next(sweep, &mut self.faults)),
         }
     }
 
@@ -130,6 +146,7 @@ impl Recording {
         match &mut self.reader {
             Reader::Packets(sweeps) => sweeps.rewind(),
             Reader::Clouds(clouds) => clouds.rewind(&mut self.faults),
+            Reader::Raw(sweeps) => sweeps.rewind(),
         }
     }
 

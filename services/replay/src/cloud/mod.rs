@@ -7,6 +7,7 @@ pub(crate) mod kitti;
 mod lzf;
 pub(crate) mod nuscenes;
 mod organise;
+pub(crate) mod packed;
 pub(crate) mod pcd;
 pub(crate) mod ply;
 mod ply_header;
