@@ -24,10 +24,12 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
 
 fn line(event: &EventView) -> Line<'_> {
     let (sign, style) = if event.grave { ("! ", theme::alarm()) } else { ("  ", ratatui::style::Style::new()) };
+    // What is the whole chain's says so by itself.
+    let stage = if event.stage == "chain" { String::new() } else { format!("{} ", event.stage) };
     Line::from_iter([
         Span::styled(clock(event.at_s), theme::faint()),
         Span::styled(format!(" {sign}"), style),
-        Span::styled(format!("{} ", event.stage), theme::strong()),
+        Span::styled(stage, theme::strong()),
         Span::styled(event.what.as_str(), style),
     ])
 }

@@ -90,7 +90,7 @@ fn bars(buffer: &mut Buffer, area: Rect, found: &LatencyView) {
             Some(ms) => {
                 bar(buffer, x, area, scale.eighths(*ms).max(1), found.deadline_ms.is_some_and(|limit| *ms > limit))
             }
-            None => drop(buffer.set_string(x, y(0), "×", theme::alarm())),
+            None => buffer.set_string(x, y(0), "×", theme::alarm()),
         }
     }
 }

@@ -25,15 +25,16 @@ pub(super) fn latency(view: &View) -> String {
         return "no sweep answered yet".to_owned();
     }
     let times = [found.p50_ms, found.p99_ms, found.max_ms];
-    let words = ["p50", "p99", "max"];
-    let all = |value: &dyn Fn(f64) -> f64| {
-        let parts = words.iter().zip(times).map(|(word, ms)| format!("{word} {}", hundredths(ms.map(value))));
-        parts.collect::<Vec<_>>().join(" ")
-    };
-    let Some(deadline_ms) = found.deadline_ms else { return format!("latency {} ms, no deadline", all(&|ms| ms)) };
+    let named = ["p50", "p99", "max"].into_iter().zip(times);
+    let all = named.map(|(word, ms)| format!("{word} {}", three_digits(ms))).collect::<Vec<_>>().join(" ");
+    let Some(deadline_ms) = found.deadline_ms else { return format!("latency {all} ms, no deadline") };
     let margins = times.map(|ms| tenths(ms.map(|ms| deadline_ms - ms))).join(" ");
     let misses = if found.missed_in_all == 1 { "1 miss".to_owned() } else { format!("{} misses", found.missed_in_all) };
-    format!("latency {} ms   margin to {deadline_ms:.0}: {margins} ms   {misses}", all(&|ms| ms))
+    format!("latency {all} ms, margin to {deadline_ms:.0}: {margins}, {misses}")
+}
+
+fn three_digits(ms: Option<f64>) -> String {
+    if ms.is_some_and(|ms| ms >= 100.0) { tenths(ms) } else { hundredths(ms) }
 }
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {

@@ -49,12 +49,12 @@ type Moment = (f64, u64);
 impl Events {
     fn add(&mut self, (at_s, sweep): Moment, stage: &str, kind: Kind, count: u64, text: String) {
         let same = |event: &&mut Event| event.stage == stage && event.kind == kind && at_s - event.at_s < MERGE_S;
-        if kind != Kind::Once {
-            if let Some(event) = self.events.iter_mut().rev().find(same) {
-                event.count += count;
-                event.text = text;
-                return;
-            }
+        if kind != Kind::Once
+            && let Some(event) = self.events.iter_mut().rev().find(same)
+        {
+            event.count += count;
+            event.text = text;
+            return;
         }
         self.events.push_back(Event { at_s, sweep, stage: stage.to_owned(), kind, count, text });
         if self.events.len() > MOST {
@@ -99,11 +99,11 @@ impl Events {
                 self.add(now, name, kind, new - old, text.to_owned());
             }
         };
-        grew(Kind::Lost, old.lost, new.lost, "parts lost with a process");
-        grew(Kind::Dropped, old.dropped, new.dropped, "parts dropped: the queue overflowed");
-        grew(Kind::Overrun, old.overruns, new.overruns, "sweeps beyond its budget");
+        grew(Kind::Lost, old.lost, new.lost, "lost with a process");
+        grew(Kind::Dropped, old.dropped, new.dropped, "dropped, queue full");
+        grew(Kind::Overrun, old.overruns, new.overruns, "over its budget");
         for (place, verdict) in Verdict::ALL.into_iter().enumerate() {
-            let text = format!("parts rejected: {}", verdict.name());
+            let text = format!("rejected, {}", verdict.name());
             grew(Kind::Rejected(place), old.rejected[place], new.rejected[place], &text);
         }
     }
@@ -112,8 +112,8 @@ impl Events {
     pub(super) fn add_misses(&mut self, now: Moment, facts: &Facts, missed: Vec<Ended>) {
         for Ended { sweep, latency_ns, .. } in missed {
             let text = match latency_ns {
-                Some(ns) => format!("deadline missed: {:.1} ms of {:.0}", ns as f64 / 1e6, facts.deadline_ms),
-                None => "deadline missed: not answered".to_owned(),
+                Some(ns) => format!("{:.1} ms of {:.0}", ns as f64 / 1e6, facts.deadline_ms),
+                None => "not answered".to_owned(),
             };
             self.add((now.0, sweep), "chain", Kind::Miss, 1, text);
         }
@@ -125,13 +125,19 @@ impl Events {
     }
 }
 
+fn times(count: u64) -> String {
+    if count == 1 { "once".to_owned() } else { format!("{count} times") }
+}
+
 impl Event {
     fn view(&self) -> EventView {
         let what = match self.kind {
             Kind::Once => self.text.clone(),
-            Kind::Miss if self.count == 1 => self.text.clone(),
-            Kind::Miss => format!("{} {}", self.count, self.text.replace("deadline missed:", "deadlines missed, last")),
-            _ => format!("{} {}", self.count, self.text),
+            Kind::Miss if self.count == 1 => format!("deadline missed: {}", self.text),
+            Kind::Miss => format!("{} deadlines missed, last {}", self.count, self.text),
+            Kind::Overrun => format!("{}: {}", self.text, times(self.count)),
+            _ if self.count == 1 => format!("{}: 1 part", self.text),
+            _ => format!("{}: {} parts", self.text, self.count),
         };
         let grave = matches!(self.kind, Kind::Lost | Kind::Dropped | Kind::Miss) || what.ends_with("is gone");
         EventView { at_s: self.at_s, sweep: self.sweep, stage: self.stage.clone(), what, grave }

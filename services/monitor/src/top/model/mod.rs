@@ -31,6 +31,8 @@ pub(crate) struct Model {
     /// Looks of the last [`RATE_NS`] and the one before, the latest last.
     marks: VecDeque<Mark>,
     uptime_s: Option<f64>,
+    /// The uptime, or the last that was known.
+    event_s: f64,
     notice: Option<String>,
 }
 
@@ -50,6 +52,7 @@ impl Model {
             events: Events::default(),
             marks: VecDeque::new(),
             uptime_s: None,
+            event_s: 0.0,
             notice: None,
         }
     }
@@ -71,11 +74,12 @@ impl Model {
     pub(crate) fn sample(&mut self, sample: Sample) {
         let at_s = sample.at_ns as f64 / 1e9;
         self.uptime_s = sample.supervisor.map(|supervisor| at_s - supervisor.started_s);
-        let sweep = sent_sweeps(&self.facts, &sample);
+        self.event_s = self.uptime_s.unwrap_or(self.event_s);
+        let now = (self.event_s, sent_sweeps(&self.facts, &sample));
         if let Some(before) = self.marks.back() {
-            self.events.compare(&self.facts, (self.uptime_s.unwrap_or(0.0), sweep), &before.sample, &sample);
+            self.events.compare(&self.facts, now, &before.sample, &sample);
         }
-        self.events.add_misses((self.uptime_s.unwrap_or(0.0), sweep), &self.facts, self.sweeps.take_misses());
+        self.events.add_misses(now, &self.facts, self.sweeps.take_misses());
         let busy_ns = self.sweeps.busy_ns().to_vec();
         let parts = self.sweeps.tap().parts;
         let from_ns = sample.at_ns.saturating_sub(RATE_NS);
