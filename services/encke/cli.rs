@@ -54,9 +54,9 @@ pub(crate) enum Command {
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
     Doctor(DoctorArgs),
-    /// Show a running chain in the terminal.
-    #[command(after_help = TOP_NOTES)]
-    Top(TopArgs),
+    /// Show a recording in a browser: cloud, obstacles, latencies. As one page that needs nothing else, or served.
+    #[command(after_help = VIEW_NOTES)]
+    View(ViewArgs),
 }
 
 const RUN_EXAMPLES: &str = "Examples:
@@ -127,14 +127,14 @@ const INJECT_EXAMPLES: &str = "Faults:
 Example:
   encke inject stop clusterer --for 500ms";
 
-const TOP_NOTES: &str = "\
-Looks only: the chain neither waits for it nor knows of it. Where standard output is no terminal, one snapshot is printed.
-Keys: q leaves, tab chooses a panel, enter zooms it, p pauses, ? says more.
+const VIEW_NOTES: &str = "\
+The page needs WebGL 2 and no network; any browser of 2023 or later shows it. A written page holds its sweeps, and leaves
+some out evenly where they would take more than --limit-mb. A served one fetches them as it shows them: for long recordings.
 
 Examples:
-  encke top
-  encke top --instance flight-1 --interval 250ms
-  encke top --once --json";
+  encke view run.mcap                              writes run.html
+  encke view run.mcap --out page.html --first 100 --sweeps 50 --open
+  encke view run.mcap --serve                      says where; Ctrl-C ends it";
 
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
@@ -435,21 +435,37 @@ pub(crate) struct DoctorArgs {
     pub(crate) json: bool,
 }
 
-/// Options of `encke top`.
+/// Options of `encke view`.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct TopArgs {
-    /// The chain. [default: the only one that runs]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) instance: Option<String>,
-    /// Between two looks.
-    #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = parse_duration)]
-    pub(crate) interval: Duration,
-    /// Print one snapshot, taken over two intervals, and leave.
+pub(crate) struct ViewArgs {
+    /// A recording of Encke's: `encke run --record FILE.mcap`.
+    #[arg(value_name = "FILE.mcap")]
+    pub(crate) file: PathBuf,
+    /// The page. [default: the recording's name with .html]
+    #[arg(long, value_name = "PAGE.html")]
+    pub(crate) out: Option<PathBuf>,
+    /// Serve the page and its sweeps instead, until stopped; only to this machine unless another address is given.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
+    #[arg(conflicts_with_all = ["out", "limit_mb"])]
+    pub(crate) serve: Option<std::net::SocketAddr>,
+    /// Leave out so many sweeps at the start.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) first: usize,
+    /// Look at so many sweeps from there. [default: all]
+    #[arg(long, value_name = "N")]
+    pub(crate) sweeps: Option<usize>,
+    /// Show every K-th of them.
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    pub(crate) every: usize,
+    /// Show at most so many returns of a sweep. [default: all]
+    #[arg(long, value_name = "N")]
+    pub(crate) points: Option<usize>,
+    /// Most that the sweeps in a written page may take [MB].
+    #[arg(long, value_name = "MB", default_value_t = 40)]
+    pub(crate) limit_mb: usize,
+    /// Open it in the browser.
     #[arg(long)]
-    pub(crate) once: bool,
-    /// Print the snapshot as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
+    pub(crate) open: bool,
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod simulate;
 mod sources;
 mod top;
 mod train;
+mod view;
 
 use std::alloc::System;
 use std::io::Write;
@@ -79,7 +80,7 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
-        Command::Top(args) => top::top(&args),
+        Command::View(args) => view::view(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,1 +1,28 @@
-//! A recording as one self-contained web page.
+//! A recording of the chain as a web page of our own: written as one file that needs nothing else, or served on this
+//! machine so that long recordings work.
+//!
+//! [`Recording`] finds what an MCAP file of Encke's holds of each sweep; [`write_page`] puts a [`Selection`] of its sweeps
+//! into one HTML file; [`Server`] hands out the same page and its sweeps one by one. The page draws by itself (`page/`).
+//!
+//! ```
+//! use viewer::Recording;
+//! let error = Recording::open("no/such/file.mcap".as_ref()).err().unwrap();
+//! assert!(error.to_string().starts_with("no/such/file.mcap: cannot be read"));
+//! ```
+
+mod cloud;
+mod columns;
+mod error;
+mod http;
+mod overview;
+mod page;
+mod recording;
+mod records;
+mod serve;
+mod write;
+
+pub use cloud::POINT_UNIT_M;
+pub use error::ViewError;
+pub use recording::{Recording, Row, Selection};
+pub use serve::Server;
+pub use write::{Limits, Written, write_page};
