@@ -288,3 +288,126 @@ impl Reels {
         &self.path
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::Compression;
+    use crate::settings::TapeFile;
+    use crate::settings::tests::shipped;
+    use crate::sink::tests::SmallDisk;
+
+    const S: u64 = 1_000_000_000;
+    const MESSAGE: [u8; 1000] = [7; 1000];
+
+    /// Files in memory, each on a disk with the room that there is when it is opened.
+    #[derive(Clone, Default)]
+    struct Shelf {
+        room: Arc<AtomicUsize>,
+        files: Arc<Mutex<Vec<(PathBuf, SmallDisk)>>>,
+    }
+
+    impl Shelf {
+        fn open(&self) -> Open {
+            let shelf = self.clone();
+            Box::new(move |path| {
+                let room = shelf.room.load(Ordering::Relaxed);
+                if room == 0 {
+                    return Err(io::ErrorKind::ReadOnlyFilesystem.into());
+                }
+                let disk = SmallDisk { room, ..SmallDisk::default() };
+                shelf.files.lock().unwrap().push((path.to_owned(), disk.clone()));
+                Ok(Box::new(disk))
+            })
+        }
+
+        /// Name and messages of each file, as far as it reads.
+        fn read(&self) -> Vec<(String, usize)> {
+            let files = self.files.lock().unwrap();
+            let read = |(path, disk): &(PathBuf, SmallDisk)| {
+                let bytes = disk.bytes.lock().unwrap().clone();
+                let stream =
+                    mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into()).unwrap();
+                let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+                (name, stream.take_while(Result::is_ok).count())
+            };
+            files.iter().map(read).collect()
+        }
+    }
+
+    fn start(shelf: &Shelf, folder: &Path, change: impl FnOnce(&mut TapeFile)) -> Result<Reels, TapeError> {
+        let mut file = TapeFile { compression: Compression::None, chunk_kib: 1, ..shipped() };
+        change(&mut file);
+        Reels::start(file.checked().unwrap(), &folder.join("run.mcap"), About::default(), false, shelf.open(), 0)
+    }
+
+    fn write(reels: &mut Reels, utc_ns: u64) {
+        reels.write(Topic::Status, &Stamps { log_time_ns: 5, utc_ns, sequence: 0 }, &MESSAGE);
+        reels.commit(utc_ns);
+    }
+
+    fn told(reels: &Reels) -> (u64, u64) {
+        (reels.messages()[Topic::Status as usize], reels.lost[Topic::Status as usize])
+    }
+
+    #[test]
+    fn what_is_lost_and_what_is_written_add_up_wherever_the_disk_fills() {
+        let folder = tempfile::tempdir().unwrap();
+        // The schemas and the first message are the first chunk.
+        for room in (400..16_000).step_by(97) {
+            let shelf = Shelf::default();
+            shelf.room.store(room, Ordering::Relaxed);
+            let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 0.0).unwrap();
+            for number in 0..20 {
+                write(&mut sut, number * 3600 * S);
+            }
+            sut.finish(0);
+            let (written, lost) = told(&sut);
+            assert_eq!(written + lost, 20, "{room}");
+            assert_eq!(shelf.read(), [("run.mcap".to_owned(), written as usize)], "{room}");
+            assert_eq!(shelf.files.lock().unwrap()[0].1.bytes.lock().unwrap().len() as u64, sut.bytes());
+            assert!(sut.failure.is_some());
+        }
+    }
+
+    #[test]
+    fn a_new_file_is_tried_later_and_one_without_messages_is_used_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let shelf = Shelf::default();
+        shelf.room.store(14_000, Ordering::Relaxed);
+        let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 10.0).unwrap();
+        while sut.failure.is_none() {
+            write(&mut sut, S);
+        }
+        let (first, lost) = told(&sut);
+        assert!(first > 0);
+        assert_eq!(lost, 1);
+        write(&mut sut, 10 * S);
+        assert_eq!(shelf.read().len(), 1, "not yet");
+        shelf.room.store(500, Ordering::Relaxed);
+        write(&mut sut, 11 * S);
+        shelf.room.store(0, Ordering::Relaxed);
+        write(&mut sut, 21 * S);
+        shelf.room.store(14_000, Ordering::Relaxed);
+        write(&mut sut, 31 * S);
+        write(&mut sut, 32 * S);
+        sut.finish(33 * S);
+        assert_eq!(told(&sut), (first + 2, lost + 3));
+        let names = |name: &str, messages: u64| (name.to_owned(), messages as usize);
+        assert_eq!(shelf.read(), [names("run.mcap", first), names("run_0001.mcap", 0), names("run_0001.mcap", 2)]);
+    }
+
+    #[test]
+    fn a_disk_that_is_full_at_the_start_is_an_event_and_one_that_cannot_be_opened_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let shelf = Shelf::default();
+        assert!(matches!(start(&shelf, folder.path(), |_| ()), Err(TapeError::Create { .. })));
+        shelf.room.store(10, Ordering::Relaxed);
+        let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 0.0).unwrap();
+        write(&mut sut, S);
+        assert_eq!((told(&sut), sut.failure.is_some()), ((0, 1), true));
+    }
+}

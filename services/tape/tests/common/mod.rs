@@ -1,0 +1,246 @@
+//! Sweeps and detections by hand, in sectors as the chain sends them, and recordings read back.
+
+#![allow(dead_code, unreachable_pub, reason = "shared by test files, each of which uses its own share")]
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+use lidar::{Column, ObstacleClass, Return, Ring};
+use messages::{
+    ClusterSummary, Cutter, Detection, Detections, Message, Part, Raw, Solid, Sweep, Trace, Truth, TruthObject,
+};
+use tape::{About, Settings, Tape, TapeFile, Topic};
+use zerocopy::FromZeros;
+
+/// The host's UTC at which everything begins [ns].
+pub const UTC_NS: u64 = 1_700_000_000_000_000_000;
+/// Duration of a turn [ns].
+pub const PERIOD_NS: u64 = 100_000_000;
+const COLUMNS: u32 = 120;
+/// Neighbouring columns that make a cluster; the first of each has a refused return.
+const CLUSTER_COLUMNS: u32 = 6;
+
+/// A sweep with all that the chain says of it.
+pub struct Made {
+    pub number: u64,
+    pub sweep: Box<Sweep>,
+    pub detections: Box<Detections>,
+    pub truth: Box<Truth>,
+}
+
+/// Clusters of six columns by two rings each, of all classes in turn, with solids but for the unclassified.
+pub fn made(number: u64) -> Made {
+    let mut sweep = Sweep::new_box_zeroed().unwrap();
+    let step = TAU as f32 / COLUMNS as f32;
+    let header = &mut sweep.header;
+    (header.organised, header.complete, header.column_step_rad) = (1, 1, step);
+    (header.period_ns, header.sensor_time_ns) = (PERIOD_NS, 5_000_000_000 + number * PERIOD_NS);
+    for elevation_rad in [-0.1, 0.1] {
+        sweep.rings.push(Ring { elevation_rad, offset_ns: 10 }).unwrap();
+    }
+    let mut recorded = 0;
+    for column in 0..COLUMNS {
+        let azimuth_rad = column as f32 * step - 3.0;
+        sweep.columns.push(Column { azimuth_rad, offset_ns: column * 1_000, valid: 1 }).unwrap();
+        recorded += u32::from(column % CLUSTER_COLUMNS == 0);
+        for ring in 0..2 {
+            let range_m = 5.0 + (number % 7) as f32 * 0.5;
+            let (x, y) = (range_m * azimuth_rad.cos(), range_m * azimuth_rad.sin());
+            let intensity = (number % 251) as u8;
+            let echo = Return { x, y, z: 0.5, column: column as u16, ring, intensity };
+            sweep.returns.push(echo).unwrap();
+            sweep.recorded_index.push(recorded).unwrap();
+            recorded += 1;
+        }
+    }
+    sweep.header.recorded = recorded;
+    sweep.header.refused[0] = COLUMNS / CLUSTER_COLUMNS;
+    let detections = detections(&sweep);
+    let mut truth = Truth::new_box_zeroed().unwrap();
+    truth.sensor_time_ns = sweep.header.sensor_time_ns;
+    truth.objects.push(TruthObject { id: 1, centre_m: [number as f32, 0.0, 0.0], ..TruthObject::default() }).unwrap();
+    Made { number, sweep, detections, truth }
+}
+
+fn detections(sweep: &Sweep) -> Box<Detections> {
+    let mut whole = Detections::new_box_zeroed().unwrap();
+    whole.header = sweep.header;
+    let each = 2 * CLUSTER_COLUMNS as usize;
+    for (number, members) in sweep.recorded_index.chunks(each).enumerate() {
+        let class = ObstacleClass::ALL[number % 5];
+        let (first_member, first_solid) = (whole.members.len() as u32, whole.solids.len() as u32);
+        let solids = u32::from(class != ObstacleClass::Unclassified);
+        let summary = ClusterSummary {
+            key: members[0],
+            first_member,
+            points: each as u32,
+            rings: 2,
+            centroid_m: sweep.returns[number * each].position(),
+            ..ClusterSummary::default()
+        };
+        let posterior = [0.1, 0.2, 0.3, 0.4];
+        whole.members.extend_from_slice(members).unwrap();
+        whole
+            .detections
+            .push(Detection { summary, posterior, first_solid, solids, class, ..Detection::default() })
+            .unwrap();
+        if solids > 0 {
+            let centre_m = summary.centroid_m;
+            whole.solids.push(Solid { centre_m, size_m: [1.0, 2.0, 3.0], ..Solid::default() }).unwrap();
+        }
+    }
+    whole
+}
+
+impl Made {
+    pub fn trace(&self, sector: u32, sectors: u32) -> Trace {
+        let ordinal = self.number * u64::from(sectors) + u64::from(sector);
+        let sensor_time_ns = self.sweep.header.sensor_time_ns;
+        let part = Part { ordinal, sweep: self.number, sector, sectors, sensor_time_ns, ..Part::default() };
+        Trace { part, due_ns: 1_000 + ordinal, ..Trace::default() }
+    }
+
+    /// The sweep's sectors as the source sends them.
+    pub fn sweep_parts(&self, sectors: u32) -> Vec<(Trace, Box<Sweep>)> {
+        let cutter = Cutter::new(sectors);
+        let mut whole = Sweep::new_box_zeroed().unwrap();
+        whole.read_raw(&bytes(&*self.sweep)).unwrap();
+        cutter.measure(&mut whole);
+        let part = |sector| {
+            let mut piece = Sweep::new_box_zeroed().unwrap();
+            cutter.fill(&whole, sector, &mut piece);
+            (self.trace(sector, sectors), piece)
+        };
+        (0..sectors).map(part).collect()
+    }
+
+    /// The detections as the last stage sends them: clusters spread over the sectors, not in order of key.
+    pub fn detection_parts(&self, sectors: u32) -> Vec<(Trace, Box<Detections>)> {
+        let part = |(sector, (trace, sweep)): (usize, (Trace, Box<Sweep>))| {
+            let mut piece = Detections::new_box_zeroed().unwrap();
+            piece.header = sweep.header;
+            let here = |place: usize| (place * 7 + 3) % sectors as usize == sector;
+            for (_, detection) in self.detections.detections.iter().enumerate().filter(|&(place, _)| here(place)) {
+                let mut detection = *detection;
+                let members = &self.detections.members[detection.summary.member_places()];
+                detection.summary.first_member = piece.members.len() as u32;
+                piece.members.extend_from_slice(members).unwrap();
+                if let Some(place) = detection.solid_place() {
+                    detection.first_solid = piece.solids.len() as u32;
+                    piece.solids.push(self.detections.solids[place]).unwrap();
+                }
+                piece.detections.push(detection).unwrap();
+            }
+            (trace, piece)
+        };
+        self.sweep_parts(sectors).into_iter().enumerate().map(part).collect()
+    }
+
+    /// The sweep as a recording has it: whole, and measured.
+    pub fn sweep_bytes(&self, sectors: u32) -> Vec<u8> {
+        let mut whole = Sweep::new_box_zeroed().unwrap();
+        whole.read_raw(&bytes(&*self.sweep)).unwrap();
+        Cutter::new(sectors).measure(&mut whole);
+        bytes(&*whole)
+    }
+}
+
+pub fn bytes(of: &impl Raw) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    of.write_raw(&mut bytes);
+    bytes
+}
+
+pub fn empty<M: Message>() -> Box<M> {
+    M::new_box_zeroed().unwrap()
+}
+
+pub fn shipped() -> TapeFile {
+    toml::from_str(include_str!("../../../../config/tape.toml")).unwrap()
+}
+
+pub fn settings(topics: &[Topic]) -> Settings {
+    TapeFile { topics: topics.to_vec(), ..shipped() }.checked().unwrap()
+}
+
+pub fn about(sectors: u32) -> About {
+    About {
+        version: "0.1.0".into(),
+        source: "scenes/x.toml".into(),
+        sensor: "hdl-32e".into(),
+        sectors,
+        pace: "fast".into(),
+        instance: "i".into(),
+    }
+}
+
+pub fn start(settings: Settings, path: &Path, sectors: u32) -> Tape {
+    Tape::start(settings, path, about(sectors), None, UTC_NS).unwrap()
+}
+
+/// Hands over a whole sweep, its truth first, detections last.
+pub fn give(tape: &mut Tape, made: &Made, sectors: u32) {
+    let utc_ns = UTC_NS + made.number * PERIOD_NS;
+    tape.truth(utc_ns, &made.trace(0, sectors), &made.truth);
+    for (trace, piece) in made.sweep_parts(sectors) {
+        tape.sweep(utc_ns, &trace, &piece);
+    }
+    for (trace, piece) in made.detection_parts(sectors) {
+        tape.detections(utc_ns, &trace, &piece);
+    }
+}
+
+/// A message as it is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Read {
+    pub topic: String,
+    pub sequence: u32,
+    pub log_time_ns: u64,
+    pub utc_ns: u64,
+    pub data: Vec<u8>,
+}
+
+/// All messages of bytes up to where they are torn, and whether they are.
+pub fn read_bytes(bytes: &[u8]) -> (Vec<Read>, bool) {
+    let mut read = Vec::new();
+    let Ok(stream) = mcap::MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into()) else {
+        return (read, true);
+    };
+    for message in stream {
+        let Ok(message) = message else { return (read, true) };
+        read.push(Read {
+            topic: message.channel.topic.clone(),
+            sequence: message.sequence,
+            log_time_ns: message.log_time,
+            utc_ns: message.publish_time,
+            data: message.data.into_owned(),
+        });
+    }
+    (read, mcap::Summary::read(bytes).is_err())
+}
+
+/// All messages of a whole file, which must agree with its summary.
+pub fn read(path: &Path) -> Vec<Read> {
+    let bytes = std::fs::read(path).unwrap();
+    let (read, torn) = read_bytes(&bytes);
+    assert!(!torn, "{}", path.display());
+    let stats = mcap::Summary::read(&bytes).unwrap().unwrap().stats.unwrap();
+    assert_eq!(stats.message_count, read.len() as u64);
+    read
+}
+
+pub fn of(read: &[Read], topic: Topic) -> Vec<Read> {
+    read.iter().filter(|read| read.topic == topic.name()).cloned().collect()
+}
+
+pub fn sequences(read: &[Read], topic: Topic) -> Vec<u32> {
+    of(read, topic).iter().map(|read| read.sequence).collect()
+}
+
+/// The recordings in a folder, by name.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
