@@ -54,9 +54,9 @@ pub(crate) enum Command {
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
     Doctor(DoctorArgs),
-    /// Show a recording in a browser: cloud, obstacles, latencies. As one page that needs nothing else, or served.
-    #[command(after_help = VIEW_NOTES)]
-    View(ViewArgs),
+    /// Make one HTML page, with plots, of a run's report or recording.
+    #[command(after_help = REPORT_NOTES)]
+    Report(ReportArgs),
 }
 
 const RUN_EXAMPLES: &str = "Examples:
@@ -127,14 +127,16 @@ const INJECT_EXAMPLES: &str = "Faults:
 Example:
   encke inject stop clusterer --for 500ms";
 
-const VIEW_NOTES: &str = "\
-The page needs WebGL 2 and no network; any browser of 2023 or later shows it. A written page holds its sweeps, and leaves
-some out evenly where they would take more than --limit-mb. A served one fetches them as it shows them: for long recordings.
+const REPORT_NOTES: &str = "\
+The page needs nothing else: no script, no font, no address. It shows the distribution of latency and
+how it went over time, what sweeps spent it on, misses by cause, the slowest sweeps, the ledger, CPU and
+memory, and detections by class. What the file lacks, the page says.
+Exit codes: 0 done, 2 the file is no report, or the page cannot be written.
 
 Examples:
-  encke view run.mcap                              writes run.html
-  encke view run.mcap --out page.html --first 100 --sweeps 50 --open
-  encke view run.mcap --serve                      says where; Ctrl-C ends it";
+  encke run --report r.json && encke report r.json            writes r.html
+  encke report flight.mcap --out flight.html
+  encke report flight.mcap --json";
 
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
@@ -435,37 +437,18 @@ pub(crate) struct DoctorArgs {
     pub(crate) json: bool,
 }
 
-/// Options of `encke view`.
+/// Options of `encke report`.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct ViewArgs {
-    /// A recording of Encke's: `encke run --record FILE.mcap`.
-    #[arg(value_name = "FILE.mcap")]
+pub(crate) struct ReportArgs {
+    /// A report of `encke run --report`, or a recording of `encke run --record`; found by content.
+    #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
-    /// The page. [default: the recording's name with .html]
-    #[arg(long, value_name = "PAGE.html")]
+    /// The page; - is standard output. [default: FILE with the ending .html]
+    #[arg(long, value_name = "FILE.html", conflicts_with = "json")]
     pub(crate) out: Option<PathBuf>,
-    /// Serve the page and its sweeps instead, until stopped; only to this machine unless another address is given.
-    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
-    #[arg(conflicts_with_all = ["out", "limit_mb"])]
-    pub(crate) serve: Option<std::net::SocketAddr>,
-    /// Leave out so many sweeps at the start.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) first: usize,
-    /// Look at so many sweeps from there. [default: all]
-    #[arg(long, value_name = "N")]
-    pub(crate) sweeps: Option<usize>,
-    /// Show every K-th of them.
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    pub(crate) every: usize,
-    /// Show at most so many returns of a sweep. [default: all]
-    #[arg(long, value_name = "N")]
-    pub(crate) points: Option<usize>,
-    /// Most that the sweeps in a written page may take [MB].
-    #[arg(long, value_name = "MB", default_value_t = 40)]
-    pub(crate) limit_mb: usize,
-    /// Open it in the browser.
+    /// Print the figures as JSON instead: those of a recording are worked out from it.
     #[arg(long)]
-    pub(crate) open: bool,
+    pub(crate) json: bool,
 }
 
 #[cfg(test)]

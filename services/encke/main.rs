@@ -13,6 +13,7 @@ mod evaluate;
 mod inject;
 mod instances;
 mod outputs;
+mod report;
 mod run;
 mod simulate;
 mod sources;
@@ -80,7 +81,7 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
-        Command::View(args) => view::view(&args),
+        Command::Report(args) => report::report(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

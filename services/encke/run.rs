@@ -33,7 +33,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let settings = Settings { instance, plan, iceoryx2_config: &iceoryx2_config, spawn: !args.no_spawn };
     let report = supervisor::run(settings).map_err(Failure::start)?;
 
-    let json = serde_json::to_string_pretty(&report).map_err(Failure::run)? + "\n";
+    let json = crate::report::to_json(&report)? + "\n";
     if let Some(path) = &args.report {
         outputs::write_whole(path, json.as_bytes())?;
     }

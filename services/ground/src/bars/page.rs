@@ -7,7 +7,7 @@ use lidar::ObstacleClass;
 use super::page_plots::write_plots;
 use super::table::{percent, value};
 use super::{Bar, Claims, Evaluation, EvaluationNote, Share, SolidErrors, Standing, Tally};
-use crate::paper::page::{STYLE, escaped};
+use crate::page::{document, escaped};
 
 /// Beyond what the paper's page has: a bar that falls short is marked by more than its colour.
 const MORE_STYLE: &str = "td.short{background:#f7d9d6;font-weight:700}td.ok{background:#dfeedd}.side figure{margin:6px 0 14px;max-width:510px}";
@@ -15,14 +15,10 @@ const MORE_STYLE: &str = "td.short{background:#f7d9d6;font-weight:700}td.ok{back
 impl Evaluation {
     /// `evaluate.html`: bars, tables and plots.
     pub fn to_html(&self, note: &EvaluationNote) -> String {
-        let mut page = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-             <title>Encke: the classifier and its bars</title><style>{STYLE}{MORE_STYLE}</style></head><body><main>\n"
-        );
+        let mut page = String::new();
         // Writing to a string cannot fail.
         let _ = self.write_page(&mut page, note);
-        page + "</main></body></html>\n"
+        document("Encke: the classifier and its bars", MORE_STYLE, &page)
     }
 
     fn write_page(&self, page: &mut String, note: &EvaluationNote) -> fmt::Result {

@@ -1,13 +1,13 @@
 //! The page's plots.
 
-use std::fmt::{self, Write};
+use std::fmt;
 
 use plotters::prelude::SeriesLabelPosition;
 
 use super::charts::{self, Lines};
 use super::tally::{POINTS, RINGS};
 use super::{BudgetPoint, Evaluation, Share};
-use crate::paper::page::escaped;
+use crate::page::{escaped, figure as framed};
 
 pub(crate) fn write_plots(evaluation: &Evaluation, page: &mut String) -> fmt::Result {
     page.push_str("<h2>What decides</h2><div class=\"side\">");
@@ -23,7 +23,8 @@ pub(crate) fn write_plots(evaluation: &Evaluation, page: &mut String) -> fmt::Re
 }
 
 fn figure(page: &mut String, picture: &str, caption: &str) -> fmt::Result {
-    write!(page, "<figure>{picture}<figcaption>{caption}</figcaption></figure>")
+    page.push_str(&framed(picture, caption));
+    Ok(())
 }
 
 fn write_shares(evaluation: &Evaluation, page: &mut String) -> fmt::Result {

@@ -5,29 +5,15 @@ use std::fmt::{self, Write};
 use lidar::ObstacleClass;
 
 use super::{FourClass, Reproduction, RunNote, charts, published, svg};
-
-pub(crate) const STYLE: &str = "\
-:root{color-scheme:light}body{margin:0;background:#fff;color:#222;font:16px/1.5 Georgia,'Times New Roman',serif}\
-main{max-width:1040px;margin:0 auto;padding:24px 20px 60px}h1{font-size:28px;line-height:1.2;margin:0 0 4px}\
-h2{font-size:20px;margin:40px 0 8px;border-bottom:1px solid #ccc}p{max-width:46em}\
-table{border-collapse:collapse;font:14px/1.35 sans-serif;margin:8px 0}caption,figcaption{text-align:left;font:14px/1.45 Georgia,serif;max-width:62em}\
-caption{padding:0 0 6px}figure{margin:18px 0 28px}figcaption{padding:6px 0 0}\
-th,td{padding:4px 8px;border:1px solid #ddd;text-align:left;vertical-align:top}td.n,th.n{text-align:right;white-space:nowrap}\
-td small{color:#666}th{background:#f4f4f2;font-weight:600}.side{display:flex;flex-wrap:wrap;gap:12px 16px}\
-.wide{overflow-x:auto}svg{max-width:100%;height:auto;display:block}.note{color:#555}dl{font:14px/1.45 sans-serif;display:grid;grid-template-columns:max-content 1fr;gap:2px 14px}\
-dt{color:#666}dd{margin:0}b.k{font-family:sans-serif}";
+use crate::page::{document, escaped};
 
 impl Reproduction {
     /// `paper.html`: tables and figures, with the paper's numbers beside those reached.
     pub fn to_html(&self, run: &RunNote) -> String {
-        let mut page = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-             <title>Encke: the paper reproduced</title><style>{STYLE}</style></head><body><main>\n"
-        );
+        let mut page = String::new();
         // Writing to a string cannot fail.
         let _ = self.write_page(&mut page, run);
-        page + "</main></body></html>\n"
+        document("Encke: the paper reproduced", "", &page)
     }
 
     fn write_page(&self, page: &mut String, run: &RunNote) -> fmt::Result {
@@ -208,8 +194,4 @@ fn write_cell(page: &mut String, share: f64, paper: f64, digits: usize) -> fmt::
         page,
         "<td class=\"n\" style=\"background:rgba(35,89,168,{shade:.2})\"><b class=\"k\">{share:.digits$}</b><br><small>paper {paper:.0}</small></td>"
     )
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -3,9 +3,9 @@
 use std::fmt::{self, Write};
 
 use super::choices::{BAND_M, BANDS};
-use super::page::escaped;
 use super::{Choice, Reproduction};
 use crate::Confusion;
+use crate::page::escaped;
 
 /// Choices that this run names and does not vary.
 const NOT_VARIED: [&str; 5] = [
