@@ -22,9 +22,9 @@ class Camera {
 
   // Looks at a field of this radius from afar.
   fit(reach, pose = {}) {
-    this.reach = reach;
-    const narrow = Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight || 1);
-    const distance = 0.8 * reach / Math.tan(FOV / 2) / narrow ** 0.9;
+    this.reach ??= reach;
+    const aspect = this.canvas.clientWidth / this.canvas.clientHeight || 1;
+    const distance = Math.max(0.8, 1.05 / aspect) * reach / Math.tan(FOV / 2);
     this.fly({ target: [0, 0, 0], yaw: -2.2, pitch: 0.6, distance, ...pose });
   }
 
@@ -127,7 +127,7 @@ class Camera {
   }
 
   above() {
-    this.fit(this.reach, { yaw: -Math.PI / 2, pitch: STEEPEST });
+    this.fit(this.reach * 1.2, { yaw: -Math.PI / 2, pitch: STEEPEST });
   }
 
   level() {

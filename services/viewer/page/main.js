@@ -9,6 +9,14 @@ function message(text) {
   if (text) signals.failed = text;
 }
 
+// The cluster of another sweep that is where this one was: the nearest whose middle moved by less than a metre.
+function again(was, sweep) {
+  const middle = (cluster) => cluster.solid?.centre ?? cluster.at;
+  const moved = (cluster) => Math.hypot(...less(middle(cluster), middle(was)));
+  const near = sweep.clusters.filter((cluster) => cluster.points >= LEAST_POINTS && moved(cluster) < 1);
+  return near.sort((a, b) => moved(a) - moved(b))[0] ?? null;
+}
+
 class Viewer {
   constructor(store, scene) {
     Object.assign(this, { store, scene, at: 0, hidden: new Set(), picked: null, hover: null, playing: false, by: "class" });
@@ -51,7 +59,9 @@ class Viewer {
       dot.className = "dot";
       dot.style.background = kind.colour;
       chip.type = "button";
-      chip.append(dot, kind.name);
+      const count = kind.count = document.createElement("span");
+      count.className = "count";
+      chip.append(dot, kind.name, count);
       chip.setAttribute("aria-pressed", "true");
       chip.addEventListener("click", () => {
         const off = !this.hidden.delete(kind.number);
@@ -75,7 +85,7 @@ class Viewer {
       message("");
       const first = !this.sweep;
       this.sweep = sweep;
-      this.picked = null;
+      this.picked = this.picked && again(this.picked, sweep);
       this.hover = null;
       $("tip").hidden = true;
       if (first) this.frame();
@@ -115,6 +125,7 @@ class Viewer {
     })));
     showRamp(span, by);
     this.list.show(sweep, hidden, picked);
+    for (const kind of this.store.about.classes) kind.count.textContent = this.store.overview[kind.name][this.kept[this.at]];
     this.plots.at = this.kept[this.at];
     this.plots.draw();
     this.say();

@@ -120,7 +120,7 @@ class Plots {
     this.cursor(sheet);
     const place = this.over ?? this.at;
     const here = kinds.map((kind, k) => `${counts[k][place]} ${kind.name}`).join(", ");
-    document.getElementById("classes-said").textContent = `· ${here}`;
+    document.getElementById("classes-said").textContent = `· ${sum(place)} in sweep ${this.store.overview.sweep[place]}`;
     this.stack.setAttribute("aria-label", `Obstacles by class over time. Sweep ${this.store.overview.sweep[place]}: ${here}`);
   }
 }
