@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::{PERIOD_NS, Read, UTC_NS, bytes, empty, give, made, of, read, sequences, settings, shipped, start};
+use common::{
+    PERIOD_NS, Read, UTC_NS, bytes, empty, give, give_many, made, of, read, sequences, settings, shipped, start,
+};
 use foxglove::messages::{Log, PointCloud, SceneUpdate};
 use messages::{Clusters, Descriptors, Detections, Raw, Sweep, Trace};
 use prost::Message;
@@ -29,7 +31,7 @@ fn sweeps_read_back_to_the_bit_in_any_number_of_sectors() {
         assert_eq!(read.len(), 5);
         for (number, read) in read.iter().enumerate() {
             let made = made(number as u64);
-            assert_eq!(read.data, made.sweep_bytes(sectors), "sweep {number} of {sectors} sectors");
+            assert_eq!(read.data, bytes(&*made.sweep), "sweep {number} of {sectors} sectors");
             let mut again = empty::<Sweep>();
             again.read_raw(&read.data).unwrap();
             assert_eq!(again.returns[..], made.sweep.returns[..]);
@@ -217,8 +219,8 @@ fn the_same_messages_at_the_same_times_are_the_same_bytes() {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("run.mcap");
             let settings = TapeFile { compression, chunk_kib: 32, ..shipped() }.checked().unwrap();
-            let mut tape = start(settings, &path, 4);
-            (0..20).for_each(|number| give(&mut tape, &made(number), 4));
+            let mut tape = start(settings, &path, 1);
+            give_many(&mut tape, 0..20);
             tape.finish(UTC_NS).unwrap();
             assert_eq!(read(&path).len(), 120);
             std::fs::read(path).unwrap()

@@ -6,7 +6,7 @@ mod common;
 
 use std::path::Path;
 
-use common::{UTC_NS, about, files, give, made, of, read, sequences, settings, shipped, start};
+use common::{UTC_NS, about, files, give, give_many, made, of, read, sequences, settings, shipped, start};
 use tape::{Settings, Tape, TapeError, TapeFile, Topic, WhenFull};
 
 /// Raw sweeps in chunks of one, uncompressed, so that files grow as they are told to.
@@ -32,7 +32,7 @@ fn files_turn_over_by_size_and_each_stands_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut tape = start(growing(|file| file.rotate_mib = 1), &path, 1);
-    (0..400).for_each(|number| give(&mut tape, &made(number), 1));
+    give_many(&mut tape, 0..400);
     tape.finish(UTC_NS).unwrap();
     let files = files(folder.path());
     assert!(files.len() > 2, "{}", files.len());
@@ -55,7 +55,7 @@ fn files_turn_over_by_age() {
     let folder = tempfile::tempdir().unwrap();
     let mut tape = start(growing(|file| file.rotate_s = 1.0), &folder.path().join("run.mcap"), 1);
     // Ten sweeps a second.
-    (0..35).for_each(|number| give(&mut tape, &made(number), 1));
+    give_many(&mut tape, 0..35);
     tape.finish(UTC_NS).unwrap();
     let lengths: Vec<usize> = files(folder.path()).iter().map(|file| read(file).len()).collect();
     assert_eq!(lengths, [10, 10, 10, 5]);
@@ -66,7 +66,7 @@ fn at_the_quota_the_oldest_files_go_and_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let settings = growing(|file| (file.rotate_mib, file.quota_mib) = (1, 3));
     let mut tape = start(settings, &folder.path().join("run.mcap"), 1);
-    (0..900).for_each(|number| give(&mut tape, &made(number), 1));
+    give_many(&mut tape, 0..900);
     tape.finish(UTC_NS).unwrap();
     let bytes: u64 = files(folder.path()).iter().map(|file| std::fs::metadata(file).unwrap().len()).sum();
     assert!(bytes <= (3 << 20) + 40_000, "{bytes}");
@@ -103,7 +103,7 @@ fn at_the_quota_recording_may_stop_instead_and_what_follows_is_lost() {
     let folder = tempfile::tempdir().unwrap();
     let settings = growing(|file| (file.quota_mib, file.when_full) = (1, WhenFull::Stop));
     let mut tape = start(settings, &folder.path().join("run.mcap"), 1);
-    (0..400).for_each(|number| give(&mut tape, &made(number), 1));
+    give_many(&mut tape, 0..400);
     tape.finish(UTC_NS).unwrap();
     let kept = all_sequences(folder.path());
     assert_eq!(kept, (0..kept.len() as u32).collect::<Vec<u32>>());
@@ -167,7 +167,7 @@ fn an_earlier_recording_of_the_same_name_is_overwritten() {
     let path = folder.path().join("run.mcap");
     for sweeps in [5, 2] {
         let mut tape = start(settings(&[Topic::Sweep]), &path, 1);
-        (0..sweeps).for_each(|number| give(&mut tape, &made(number), 1));
+        give_many(&mut tape, 0..sweeps);
         tape.finish(UTC_NS).unwrap();
     }
     assert_eq!(of(&read(&path), Topic::Sweep).len(), 2);

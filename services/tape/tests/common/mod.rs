@@ -56,6 +56,7 @@ pub fn made(number: u64) -> Made {
     }
     sweep.header.recorded = recorded;
     sweep.header.refused[0] = COLUMNS / CLUSTER_COLUMNS;
+    Cutter::new(1).measure(&mut sweep);
     let detections = detections(&sweep);
     let mut truth = Truth::new_box_zeroed().unwrap();
     truth.sensor_time_ns = sweep.header.sensor_time_ns;
@@ -103,13 +104,9 @@ impl Made {
 
     /// The sweep's sectors as the source sends them.
     pub fn sweep_parts(&self, sectors: u32) -> Vec<(Trace, Box<Sweep>)> {
-        let cutter = Cutter::new(sectors);
-        let mut whole = Sweep::new_box_zeroed().unwrap();
-        whole.read_raw(&bytes(&*self.sweep)).unwrap();
-        cutter.measure(&mut whole);
         let part = |sector| {
             let mut piece = Sweep::new_box_zeroed().unwrap();
-            cutter.fill(&whole, sector, &mut piece);
+            Cutter::new(sectors).fill(&self.sweep, sector, &mut piece);
             (self.trace(sector, sectors), piece)
         };
         (0..sectors).map(part).collect()
@@ -135,14 +132,6 @@ impl Made {
             (trace, piece)
         };
         self.sweep_parts(sectors).into_iter().enumerate().map(part).collect()
-    }
-
-    /// The sweep as a recording has it: whole, and measured.
-    pub fn sweep_bytes(&self, sectors: u32) -> Vec<u8> {
-        let mut whole = Sweep::new_box_zeroed().unwrap();
-        whole.read_raw(&bytes(&*self.sweep)).unwrap();
-        Cutter::new(sectors).measure(&mut whole);
-        bytes(&*whole)
     }
 }
 
@@ -183,11 +172,25 @@ pub fn start(settings: Settings, path: &Path, sectors: u32) -> Tape {
 pub fn give(tape: &mut Tape, made: &Made, sectors: u32) {
     let utc_ns = UTC_NS + made.number * PERIOD_NS;
     tape.truth(utc_ns, &made.trace(0, sectors), &made.truth);
+    if sectors == 1 {
+        tape.sweep(utc_ns, &made.trace(0, 1), &made.sweep);
+        tape.detections(utc_ns, &made.trace(0, 1), &made.detections);
+        return;
+    }
     for (trace, piece) in made.sweep_parts(sectors) {
         tape.sweep(utc_ns, &trace, &piece);
     }
     for (trace, piece) in made.detection_parts(sectors) {
         tape.detections(utc_ns, &trace, &piece);
+    }
+}
+
+/// Hands over many sweeps that differ in number and time alone, as one part each.
+pub fn give_many(tape: &mut Tape, numbers: std::ops::Range<u64>) {
+    let mut made = made(numbers.start);
+    for number in numbers {
+        made.number = number;
+        give(tape, &made, 1);
     }
 }
 
