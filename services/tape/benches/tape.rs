@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
@@ -53,7 +53,7 @@ fn dense(sweeps: u64) -> Vec<Input> {
             sweep.rings.push(Ring { elevation_rad: elevation_rad(ring), offset_ns: u32::from(ring) * 1_152 }).unwrap();
         }
         for column in 0..columns {
-            let azimuth_rad = column as f32 * step - 3.14;
+            let azimuth_rad = column as f32 * step - PI;
             sweep.columns.push(Column { azimuth_rad, offset_ns: column * 53_000, valid: 1 }).unwrap();
             for ring in 0..rings {
                 let wall_m = 12.0 + 4.0 * (azimuth_rad * 3.0).sin() + f32::from(ring) * 0.05;
