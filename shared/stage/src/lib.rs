@@ -30,7 +30,8 @@ pub trait Stage: Sized {
 
 /// Where sweeps come from.
 pub trait Source {
-    /// Fills `sweep` (and `truth`, where there is one) with the next sweep; both arrive empty.
+    /// Fills `sweep` (and `truth`, where there is one) with the next sweep; both arrive empty. Waits no longer than some
+    /// 50 ms: where nothing comes, both stay empty.
     fn next(&mut self, sweep: &mut Sweep, truth: &mut Truth) -> Result<Next, SourceError>;
 
     /// Leaves out the next `sweeps` sweeps, as a restarted source must. `sweep` and `truth` are scratch space.
@@ -44,6 +45,11 @@ pub trait Source {
         }
         Ok(())
     }
+
+    /// Whether its sweeps come when they come: each is due at once.
+    fn is_live(&self) -> bool {
+        false
+    }
 }
 
 /// What a source gave.
@@ -53,6 +59,8 @@ pub enum Next {
     Sweep,
     /// The recording has ended; nothing was filled in.
     End,
+    /// Nothing yet: ask again. Only a live source says so.
+    Nothing,
 }
 
 /// Whom a sink tells of every accepted part that is finished for good (written and flushed): in order, at once, from
