@@ -36,7 +36,8 @@ const UNSAFE: [&str; 3] =
     ["shared/transport/src/outlet.rs", "shared/transport/src/wire.rs", "shared/runtime/src/page/map.rs"];
 /// Where time may be read and threads may be started.
 const CLOCK: &str = "shared/runtime/src/clock.rs";
-const THREADS: [&str; 3] = ["services/supervisor/src", "services/recorder/src", "services/ground/src"];
+const THREADS: [&str; 4] =
+    ["services/supervisor/src", "services/recorder/src", "services/ground/src", "services/replay/src/live"];
 /// Longest file of code, tests apart.
 const MAX_LINES: usize = 500;
 

@@ -115,6 +115,14 @@ pub enum ReplayError {
         /// Farthest accepted range [m].
         far_m: f64,
     },
+    /// A live sensor's socket cannot be had.
+    #[error("{address}: cannot be listened to ({source}); give an address of this machine and a port that is free")]
+    Socket {
+        /// As in `--from`.
+        address: String,
+        /// What the system said.
+        source: io::Error,
+    },
 }
 
 /// A place in a file.
@@ -124,6 +132,8 @@ pub enum Place {
     Byte(u64),
     /// Line, from 1.
     Line(u64),
+    /// Packet of a live sensor, from 1.
+    Packet(u64),
 }
 
 impl std::fmt::Display for Place {
@@ -131,6 +141,7 @@ impl std::fmt::Display for Place {
         match self {
             Self::Byte(offset) => write!(f, "byte {offset}"),
             Self::Line(line) => write!(f, "line {line}"),
+            Self::Packet(number) => write!(f, "packet {number}"),
         }
     }
 }

@@ -43,11 +43,23 @@ pub enum Fault {
     BadFile,
     /// A file of a folder that is no recording.
     OtherFile,
+    /// The sensor's clock was set forward by a few milliseconds: the sweep goes on.
+    ClockStep,
+    /// A datagram to a live sensor's port that is no data packet by its length.
+    OtherLength,
+    /// A datagram of a sender that is not accepted.
+    OtherSender,
+    /// A data packet of another kind of sensor than the one supposed.
+    OtherProduct,
+    /// A live sensor's packet that came while the ring was full.
+    RingFull,
+    /// Datagrams that the kernel dropped before they could be taken.
+    KernelDrop,
 }
 
 impl Fault {
     /// All kinds.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::TornCapture,
         Self::BadFrame,
         Self::NoBlock,
@@ -66,6 +78,12 @@ impl Fault {
         Self::UnknownColumn,
         Self::BadFile,
         Self::OtherFile,
+        Self::ClockStep,
+        Self::OtherLength,
+        Self::OtherSender,
+        Self::OtherProduct,
+        Self::RingFull,
+        Self::KernelDrop,
     ];
 
     /// The kind's word in logs and reports.
@@ -89,6 +107,12 @@ impl Fault {
             Self::UnknownColumn => "unknown_column",
             Self::BadFile => "bad_file",
             Self::OtherFile => "other_file",
+            Self::ClockStep => "clock_step",
+            Self::OtherLength => "other_length",
+            Self::OtherSender => "other_sender",
+            Self::OtherProduct => "other_product",
+            Self::RingFull => "ring_full",
+            Self::KernelDrop => "kernel_drop",
         }
     }
 }

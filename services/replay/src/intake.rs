@@ -21,6 +21,7 @@ impl Limits {
     }
 
     /// Why a return at `position_m` is refused, if it is.
+    #[inline]
     pub(crate) fn refusal(&self, position_m: [f64; 3]) -> Option<Refusal> {
         let [x, y, z] = position_m;
         // What is finite here may not be in a message.
@@ -42,6 +43,7 @@ impl Limits {
 }
 
 /// Puts a recorded return into `sweep`, or counts why not; either way it takes the next index of the sweep.
+#[inline]
 pub(crate) fn take(sweep: &mut Sweep, limits: &Limits, position_m: [f64; 3], at: Return) {
     match limits.refusal(position_m) {
         Some(reason) => refuse(sweep, reason, 1),

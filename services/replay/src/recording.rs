@@ -1,26 +1,27 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lidar::SensorModel;
 use messages::{Sweep, Truth};
 use stage::{Next, Source, SourceError};
 
-use crate::capture::Capture;
-use crate::cloud::files::CloudFiles;
-use crate::cloud::sweeps::Clouds;
+use crate::capture::{self, Capture};
+use crate::cloud::files::Clouds;
 use crate::error::ReplayError;
 use crate::faults::Faults;
 use crate::files;
 use crate::format::Format;
 use crate::intake::Limits;
-use crate::mcap::{Kind, MessageClouds, Messages, RawSweeps};
-use crate::velodyne::{Sweeps, check_rate};
+use crate::velodyne::{Probe, Progress, Sweeps};
+
+/// The sensor of every format that does not say it, where the caller does not either.
+pub(crate) const DEFAULT_SENSOR: &str = "hdl-32e";
 
 /// What the caller may say of a recording. Everything else is found in it.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The format, where its content does not tell or a folder holds several.
     pub format: Option<Format>,
-    /// Name of the sensor model; if none, `hdl-64e` for KITTI and `hdl-32e` elsewhere.
+    /// Name of the sensor model; that of the packets' factory byte if none, else `hdl-32e`.
     pub sensor: Option<String>,
     /// The topic of an MCAP file to read, where it has several that hold sweeps.
     pub topic: Option<String>,
@@ -65,34 +66,21 @@ enum Reader {
 pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result<Recording, ReplayError> {
     let mut faults = Faults::default();
     let (files, format) = files::find(path, options.format, &mut faults)?;
-    let name = options.sensor.as_deref().unwrap_or(format.sensor());
+    let packets = open_packets(&files, format)?;
+    let found = packets.as_ref().and_then(|(_, probe)| probe.sensor());
+    let name = options.sensor.as_deref().or(found).unwrap_or(DEFAULT_SENSOR);
     let sensor = sensors(name).map_err(|source| ReplayError::Sensor { name: name.to_owned(), source })?;
     let [near_m, far_m] = sensor.accepted_range_m();
     let near_m = options.min_range_m.or(format.near_m()).unwrap_or(near_m);
     let limits = Limits::checked(near_m, options.max_range_m.unwrap_or(far_m))?;
-    let reader = match format {
-        Format::Pcap => {
-            check_rate(&files, &sensor)?;
-            let sweeps = Sweeps::new(Capture::new(files), &sensor, limits, options.both_returns)?;
+    let reader = match packets {
+        Some((capture, probe)) => {
+            probe.check_rate(&sensor)?;
+            let mut sweeps = Sweeps::new(capture, &sensor, limits, options.both_returns)?;
+            sweeps.look_for_gap()?;
             Reader::Packets(Box::new(sweeps))
         }
-        Format::Mcap => {
-            let messages = Messages::open(files, options.topic.as_deref())?;
-            match messages.kind() {
-                Kind::Raw => {
-                    let is_asked = options.min_range_m.is_some() || options.max_range_m.is_some();
-                    Reader::Raw(Box::new(RawSweeps::new(messages, is_asked.then_some(limits))?))
-                }
-                Kind::PointCloud2 | Kind::PointCloud2Ros1 | Kind::Foxglove => {
-                    let source = Box::new(MessageClouds::new(messages));
-                    Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
-                }
-            }
-        }
-        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti => {
-            let source = Box::new(CloudFiles::new(files, format));
-            Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
-        }
+        None => Reader::Clouds(Box::new(Clouds::new(files, format, &sensor, limits, &mut faults)?)),
     };
     Ok(Recording {
         reader,
@@ -103,6 +91,30 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
         shift_ns: 0,
         pass_ns: None,
     })
+}
+
+/// The source of data packets and what its first ones say, for formats that have them.
+fn open_packets(files: &[PathBuf], format: Format) -> Result<Option<(Capture, Probe)>, ReplayError> {
+    let mut capture = match format {
+        Format::Pcap => Capture::pcap(files.to_vec()),
+        Format::Mcap if has_packets(files)? => Capture::mcap(files.to_vec()),
+        Format::Mcap => {
+            let what = "holds no velodyne_msgs/msg/VelodyneScan".to_owned();
+            return Err(ReplayError::Empty { path: files.first().cloned().unwrap_or_default(), what });
+        }
+        _ => return Ok(None),
+    };
+    let probe = Probe::of(&mut capture)?;
+    Ok(Some((capture, probe)))
+}
+
+fn has_packets(files: &[PathBuf]) -> Result<bool, ReplayError> {
+    for path in files {
+        if capture::mcap::has_packets(path).map_err(|source| ReplayError::Io { path: path.clone(), source })? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 impl Recording {
@@ -131,7 +143,7 @@ impl Recording {
 
     fn next_of_pass(&mut self, sweep: &mut Sweep) -> Result<bool, ReplayError> {
         match &mut self.reader {
-            Reader::Packets(sweeps) => sweeps.next(sweep, &mut self.faults),
+            Reader::Packets(sweeps) => Ok(sweeps.next(sweep, &mut self.faults)? == Progress::Sweep),
             Reader::Clouds(clouds) => Ok(clouds.next(sweep, &mut self.faults)),
             Reader::Raw(sweeps) => Ok(sweeps.next(sweep, &mut self.faults)),
         }

@@ -2,15 +2,19 @@
 
 use lidar::SensorModel;
 
-use super::packet::{BLOCKS, CHANNELS, HOUR_US, Packet, TURN_CDEG};
-use crate::capture::{Arrival, Capture};
-use crate::error::{Place, ReplayError};
+use super::field::Gap;
+use super::packet::{CHANNELS, HOUR_US, Packet, TURN_CDEG};
+use super::slots::{Slot, Slots};
+use crate::capture::{Arrival, Capture, Got};
+use crate::error::ReplayError;
 use crate::faults::{Fault, Faults};
+use crate::time::absolute_ns;
 
 /// A packet this much older than the one before came late; older ones mean that the clock was set [µs].
 const LATE_US: u64 = 10_000;
 const TURN: f64 = TURN_CDEG as f64;
-const NS_PER_HOUR: i128 = HOUR_US as i128 * 1_000;
+/// Turns after which a field of view must have shown its edges.
+const TURNS_TO_LOOK_AT: f64 = 2.0;
 
 /// One firing cycle of all lasers.
 #[derive(Clone, Copy, Debug)]
@@ -23,16 +27,21 @@ pub(crate) struct Cycle {
     pub(crate) at: Option<(usize, usize)>,
     /// The recording does not go on from the cycle before.
     pub(crate) is_break: bool,
+    /// It is the first behind the gap of the sensor's field of view.
+    pub(crate) is_edge: bool,
     /// It is the first of its block: where a sweep may begin.
     pub(crate) begins_block: bool,
 }
 
-/// What a slot (a block, or a pair of them in dual-return mode) holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Slot {
-    Received,
-    Unknown,
-    Absent,
+/// What was found next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Step {
+    /// A firing cycle.
+    Cycle(Cycle),
+    /// Nothing yet: a live sensor is silent for now.
+    Nothing,
+    /// The capture has ended.
+    End,
 }
 
 /// The packet before, as far as the next one's place in time depends on it.
@@ -50,24 +59,31 @@ struct Before {
 pub(crate) struct Cycles {
     capture: Capture,
     packet: Packet,
+    /// The packet after the one at hand, where that is needed to place the latter's end in time.
+    ahead: Packet,
+    ahead_arrival: Option<Arrival>,
     cycle_ns: u64,
     cycles_per_block: usize,
-    max_cdeg_per_ns: f64,
     before: Option<Before>,
     /// Stamp of a packet that did not fit to the one before; the next packet decides who was right.
     suspect_us: Option<u64>,
     /// Turning rate over the packet at hand [0.01°/ns].
     cdeg_per_ns: f64,
-    slots: [Slot; BLOCKS],
-    azimuths_cdeg: [f64; BLOCKS],
-    slot_count: usize,
+    slots: Slots,
     time_ns: u64,
     /// Next cycle of the packet at hand to give, counted over all slots.
     next: usize,
+    /// Slots that may be given: up to a jump whose time is not known yet.
+    known: usize,
+    /// How much later than the packet's stamp says its slots from the jump on fired [ns].
+    jump_ns: u64,
     /// Cycles between the packet before and this one that are still to give, and how many there were.
     missing: (usize, usize),
-    gap_from: Option<Before>,
+    lost_from: Option<Before>,
     is_break: bool,
+    is_edge: bool,
+    /// What the sensor is set to leave out of the turn, once that was seen.
+    gap: Option<Gap>,
 }
 
 impl Cycles {
@@ -80,35 +96,68 @@ impl Cycles {
                 cycles: sensor.cycles_per_block(),
             });
         }
+        let cycle_ns = u64::from(sensor.cycle_ns());
         Ok(Self {
             capture,
             packet: Packet::default(),
-            cycle_ns: u64::from(sensor.cycle_ns()),
+            ahead: Packet::default(),
+            ahead_arrival: None,
+            cycle_ns,
             cycles_per_block,
-            max_cdeg_per_ns: 1.5 * sensor.rotation_hz()[1] * TURN / 1e9,
             before: None,
             suspect_us: None,
             cdeg_per_ns: 0.0,
-            slots: [Slot::Absent; BLOCKS],
-            azimuths_cdeg: [0.0; BLOCKS],
-            slot_count: 0,
+            slots: Slots::new(cycles_per_block as u64 * cycle_ns, sensor.rotation_hz()[1]),
             time_ns: 0,
             next: 0,
+            known: 0,
+            jump_ns: 0,
             missing: (0, 0),
-            gap_from: None,
+            lost_from: None,
             is_break: false,
+            is_edge: false,
+            gap: None,
         })
     }
 
-    /// Starts again with the capture's first packet.
+    /// Reads on for a few turns to see whether the sensor sends whole ones, then starts again.
+    pub(crate) fn look_for_gap(&mut self) -> Result<(), ReplayError> {
+        // The reading proper will find them again, and count them.
+        let mut faults = Faults::muted();
+        let (mut turned_cdeg, mut before_cdeg) = (0.0, None);
+        while self.gap.is_none() && turned_cdeg < TURNS_TO_LOOK_AT * TURN {
+            // A head that stands still shows no edge either.
+            turned_cdeg += 1.0;
+            let Step::Cycle(cycle) = self.next(&mut faults)? else { break };
+            let before_cdeg = before_cdeg.replace(cycle.azimuth_cdeg).unwrap_or(cycle.azimuth_cdeg);
+            let step_cdeg = (cycle.azimuth_cdeg - before_cdeg + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
+            turned_cdeg += step_cdeg.max(0.0);
+        }
+        self.rewind();
+        Ok(())
+    }
+
+    /// Starts again with the capture's first packet. What is known of the field of view stays.
     pub(crate) fn rewind(&mut self) {
         self.capture.rewind();
+        self.ahead_arrival = None;
+        self.cdeg_per_ns = 0.0;
+        self.interrupt();
+    }
+
+    /// Forgets the packet before: the next one begins a new row of cycles.
+    pub(crate) fn interrupt(&mut self) {
         self.before = None;
         self.suspect_us = None;
-        self.cdeg_per_ns = 0.0;
-        self.slot_count = 0;
-        self.next = 0;
+        self.slots.count = 0;
+        (self.next, self.known) = (0, 0);
         self.missing = (0, 0);
+        self.is_edge = false;
+    }
+
+    /// Where the packets come from.
+    pub(crate) fn capture(&mut self) -> &mut Capture {
+        &mut self.capture
     }
 
     /// The packet that the last cycle given lies in.
@@ -123,56 +172,88 @@ impl Cycles {
 
     /// Blocks of one slot: two in dual-return mode.
     pub(crate) fn blocks_per_slot(&self) -> usize {
-        BLOCKS / self.slot_count.max(1)
+        self.slots.blocks()
     }
 
-    /// The next firing cycle; nothing at the capture's end.
-    pub(crate) fn next(&mut self, faults: &mut Faults) -> Result<Option<Cycle>, ReplayError> {
+    /// Whether the sensor leaves out a part of the turn.
+    pub(crate) fn has_gap(&self) -> bool {
+        self.gap.is_some()
+    }
+
+    /// The next firing cycle.
+    pub(crate) fn next(&mut self, faults: &mut Faults) -> Result<Step, ReplayError> {
         loop {
             if let Some(cycle) = self.next_missing().or_else(|| self.next_of_packet()) {
-                return Ok(Some(cycle));
+                return Ok(Step::Cycle(cycle));
             }
-            let Some(arrival) = self.capture.next(&mut self.packet, faults)? else { return Ok(None) };
+            if self.known < self.slots.count {
+                if !self.look_ahead(faults)? {
+                    return Ok(Step::Nothing);
+                }
+                continue;
+            }
+            let arrival = match self.ahead_arrival.take() {
+                Some(arrival) => {
+                    std::mem::swap(&mut self.packet, &mut self.ahead);
+                    arrival
+                }
+                None => match self.capture.next(&mut self.packet, faults)? {
+                    Got::Packet(arrival) => arrival,
+                    Got::Nothing => return Ok(Step::Nothing),
+                    Got::End => return Ok(Step::End),
+                },
+            };
             self.admit(arrival, faults);
         }
     }
 
     /// A cycle that was lost before the packet at hand, evenly between what is known on both sides.
     fn next_missing(&mut self) -> Option<Cycle> {
-        let (left, all) = self.missing;
-        let from = self.gap_from.filter(|_| left > 0)?;
-        let done = all - left;
-        self.missing.0 -= 1;
-        let to_cdeg = self.first_cdeg();
-        let share = done as f64 / all as f64;
-        let advance_cdeg = (to_cdeg - from.next_cdeg).rem_euclid(TURN);
-        let span_ns = self.time_ns.saturating_sub(from.next_ns);
-        Some(Cycle {
-            azimuth_cdeg: (from.next_cdeg + share * advance_cdeg).rem_euclid(TURN),
-            time_ns: from.next_ns + (share * span_ns as f64) as u64,
-            at: None,
-            is_break: false,
-            begins_block: done % self.cycles_per_block == 0,
-        })
+        let (mut left, all) = self.missing;
+        while left > 0 {
+            let from = self.lost_from?;
+            let done = all - left;
+            left -= 1;
+            self.missing.0 = left;
+            let share = done as f64 / all as f64;
+            let advance_cdeg = (self.first_cdeg() - from.next_cdeg).rem_euclid(TURN);
+            let azimuth_cdeg = (from.next_cdeg + share * advance_cdeg).rem_euclid(TURN);
+            if self.gap.is_some_and(|gap| gap.holds(azimuth_cdeg)) {
+                self.is_edge = true;
+                continue;
+            }
+            let span_ns = self.time_ns.saturating_sub(from.next_ns);
+            return Some(Cycle {
+                azimuth_cdeg,
+                time_ns: from.next_ns + (share * span_ns as f64) as u64,
+                at: None,
+                is_break: false,
+                is_edge: std::mem::take(&mut self.is_edge),
+                begins_block: done % self.cycles_per_block == 0,
+            });
+        }
+        None
     }
 
     fn next_of_packet(&mut self) -> Option<Cycle> {
         loop {
             let (slot, cycle) = (self.next / self.cycles_per_block, self.next % self.cycles_per_block);
-            if slot >= self.slot_count {
+            if slot >= self.known {
                 return None;
             }
             self.next += 1;
-            if self.slots[slot] == Slot::Absent {
+            if self.slots.kinds[slot] == Slot::Absent {
                 continue;
             }
             let after_block_ns = cycle as u64 * self.cycle_ns;
-            let azimuth_cdeg = self.azimuths_cdeg[slot] + self.cdeg_per_ns * after_block_ns as f64;
+            let azimuth_cdeg = self.slots.azimuths_cdeg[slot] + self.cdeg_per_ns * after_block_ns as f64;
+            let jump_ns = if self.slots.jump.is_some_and(|jump| slot >= jump) { self.jump_ns } else { 0 };
             return Some(Cycle {
                 azimuth_cdeg: azimuth_cdeg.rem_euclid(TURN),
-                time_ns: self.time_ns + slot as u64 * self.slot_ns() + after_block_ns,
-                at: (self.slots[slot] == Slot::Received).then_some((slot, cycle)),
+                time_ns: self.time_ns + jump_ns + slot as u64 * self.slot_ns() + after_block_ns,
+                at: (self.slots.kinds[slot] == Slot::Received).then_some((slot, cycle)),
                 is_break: std::mem::take(&mut self.is_break),
+                is_edge: std::mem::take(&mut self.is_edge),
                 begins_block: cycle == 0,
             });
         }
@@ -182,84 +263,133 @@ impl Cycles {
         self.cycles_per_block as u64 * self.cycle_ns
     }
 
+    /// Azimuth from slot to slot [0.01°].
+    fn slot_cdeg(&self) -> f64 {
+        self.cdeg_per_ns * self.slot_ns() as f64
+    }
+
     /// Azimuth at the packet's stamp [0.01°].
     fn first_cdeg(&self) -> f64 {
-        self.azimuths_cdeg[0]
+        self.slots.azimuths_cdeg[0]
     }
 
     /// Reads the packet at hand and puts it behind the one before. A packet that is of no use leaves nothing to give.
     fn admit(&mut self, arrival: Arrival, faults: &mut Faults) {
-        self.next = 0;
-        self.slot_count = 0;
+        (self.next, self.known, self.slots.count) = (0, 0, 0);
         self.missing = (0, 0);
-        let place = Place::Byte(arrival.offset);
+        let place = arrival.place;
         let stamp_us = self.packet.stamp_us();
-        let slot_count = if self.packet.is_dual() { BLOCKS / 2 } else { BLOCKS };
-        let Some(rate) = self.read_slots(slot_count) else {
+        let Some(rate) = self.slots.read(&self.packet, self.cdeg_per_ns) else {
+            self.slots.count = 0;
             faults.note(Fault::NoBlock, 1, self.capture.path(), place, "a data packet without a block flag");
             return;
         };
-        if stamp_us >= HOUR_US {
-            let what = "a stamp beyond the hour";
-            faults.note(Fault::BadStamp, 1, self.capture.path(), place, what);
-            return;
-        }
-        let packet_ns = slot_count as u64 * self.slot_ns();
-        match self.before {
-            None => {
-                self.time_ns = absolute_ns(arrival.host_ns, stamp_us);
-                self.is_break = true;
-            }
-            Some(before) => {
-                // The hour wraps; half of it backwards is taken for backwards.
-                let step_us = (stamp_us + HOUR_US - before.stamp_us) % HOUR_US;
-                if step_us == 0 || HOUR_US - step_us <= LATE_US {
-                    faults.note(Fault::LatePacket, 1, self.capture.path(), place, "a packet came twice or late");
-                    return;
-                }
-                let time_ns = before.time_ns + step_us * 1_000;
-                let lost_ns = time_ns.saturating_sub(before.next_ns);
-                let lost = (lost_ns as f64 / packet_ns as f64).round();
-                let lost_cdeg = lost * packet_ns as f64 * rate;
-                let lost_cycles = lost * (slot_count * self.cycles_per_block) as f64;
-                if lost_cdeg < TURN / 2.0 && lost_cycles <= lidar::MAX_COLUMNS as f64 / 2.0 {
-                    self.time_ns = time_ns;
-                    if lost > 0.0 {
-                        let what = "by the stamps, packets are missing before this one";
-                        faults.note(Fault::LostPacket, lost as u64, self.capture.path(), place, what);
-                        self.missing = (lost_cycles as usize, lost_cycles as usize);
-                        self.gap_from = Some(before);
-                    }
-                } else if !self.follows_suspect(stamp_us, packet_ns) {
-                    let what = "the stamp jumps: the packet is left out";
-                    faults.note(Fault::BadStamp, 1, self.capture.path(), place, what);
-                    self.suspect_us = Some(stamp_us);
-                    return;
-                } else {
-                    let what = "the recording goes on at another time: the sweep ends here";
-                    faults.note(Fault::Break, 1, self.capture.path(), place, what);
-                    self.time_ns = absolute_ns(arrival.host_ns, stamp_us);
-                    self.is_break = true;
-                }
+        match self.join(arrival, stamp_us, rate) {
+            Ok(None) => {}
+            Ok(Some((fault, times, what))) => faults.note(fault, times, self.capture.path(), place, what),
+            Err((fault, what)) => {
+                self.slots.count = 0;
+                faults.note(fault, 1, self.capture.path(), place, what);
+                return;
             }
         }
         self.suspect_us = None;
         self.cdeg_per_ns = rate;
-        self.slot_count = slot_count;
-        let unknown = self.slots[..slot_count].iter().filter(|&&slot| slot == Slot::Unknown).count();
+        if self.gap.is_some_and(|gap| gap.holds(self.first_cdeg())) {
+            // The sensor was set to another field of view.
+            self.gap = None;
+        }
+        let unknown = self.slots.unknown();
         if unknown > 0 {
             let what = "a block without its flag, or with an azimuth beyond the turn";
             faults.note(Fault::BadBlock, unknown as u64, self.capture.path(), place, what);
         }
-        let present =
-            self.slots[..slot_count].iter().rposition(|&slot| slot != Slot::Absent).map_or(0, |last| last + 1);
-        let present_ns = present as u64 * self.slot_ns();
+        self.jump_ns = 0;
+        self.known = self.slots.jump.unwrap_or(self.slots.count);
+        let present_ns = self.slots.present() as u64 * self.slot_ns();
         self.before = Some(Before {
             stamp_us,
             time_ns: self.time_ns,
             next_ns: self.time_ns + present_ns,
             next_cdeg: (self.first_cdeg() + rate * present_ns as f64).rem_euclid(TURN),
         });
+    }
+
+    /// Finds the packet's time by the one before. Says what is wrong with it, and fails where it must be left out.
+    #[allow(clippy::type_complexity, reason = "a fault, how often, and in words")]
+    fn join(
+        &mut self,
+        arrival: Arrival,
+        stamp_us: u64,
+        rate: f64,
+    ) -> Result<Option<(Fault, u64, &'static str)>, (Fault, &'static str)> {
+        if stamp_us >= HOUR_US {
+            return Err((Fault::BadStamp, "a stamp beyond the hour"));
+        }
+        let Some(before) = self.before else {
+            self.time_ns = absolute_ns(arrival.host_ns, stamp_us);
+            self.is_break = true;
+            return Ok(None);
+        };
+        let packet_ns = self.slots.count as u64 * self.slot_ns();
+        let slot_cdeg = rate * self.slot_ns() as f64;
+        // Signed: a trembling head goes back by a little.
+        let turned_cdeg = (self.first_cdeg() - before.next_cdeg + 3.0 * slot_cdeg).rem_euclid(TURN) - 3.0 * slot_cdeg;
+        // The head goes on as if no time had passed.
+        let goes_on = slot_cdeg >= 1.0 && turned_cdeg <= 3.0 * slot_cdeg;
+        // The hour wraps; half of it backwards is taken for backwards.
+        let step_us = (stamp_us + HOUR_US - before.stamp_us) % HOUR_US;
+        let is_late = step_us == 0 || HOUR_US - step_us <= LATE_US;
+        // Where the head goes on from the packet before, not the packet is late: the clock was set back.
+        if step_us == 0 || (is_late && !goes_on && !self.follows_suspect(stamp_us, packet_ns)) {
+            return Err((Fault::LatePacket, "a packet came twice or late"));
+        }
+        let time_ns = before.time_ns + step_us * 1_000;
+        let lost_ns = time_ns.saturating_sub(before.next_ns);
+        let supposed_cdeg = lost_ns as f64 * rate;
+        let gap = self
+            .gap
+            .filter(|gap| 2.0 * supposed_cdeg > gap.width_cdeg() && gap.is_passed(before.next_cdeg, turned_cdeg));
+        let (lost, lost_cycles) = match gap {
+            None => {
+                let lost = (lost_ns as f64 / packet_ns as f64).round();
+                (lost, lost * (self.slots.count * self.cycles_per_block) as f64)
+            }
+            // By the azimuths, which say it better than the rate over a packet.
+            Some(gap) => {
+                let lost = (turned_cdeg - gap.width_cdeg()) / (slot_cdeg * self.slots.count as f64);
+                (lost.round().max(0.0), (turned_cdeg / slot_cdeg * self.cycles_per_block as f64).round())
+            }
+        };
+        let lost_cdeg = lost * packet_ns as f64 * rate;
+        // As far as time has passed the head must have turned, unless it stands still.
+        let tolerance_cdeg = supposed_cdeg / 4.0 + 3.0 * slot_cdeg;
+        let agree = lost == 0.0 || slot_cdeg < 1.0 || (turned_cdeg - supposed_cdeg).abs() <= tolerance_cdeg;
+        let is_short = lost_cdeg < TURN / 2.0 && lost_cycles <= lidar::MAX_COLUMNS as f64;
+        if !is_late && is_short && agree {
+            self.time_ns = time_ns;
+            if lost == 0.0 {
+                self.is_edge = gap.is_some();
+                return Ok(None);
+            }
+            self.missing = (lost_cycles as usize, lost_cycles as usize);
+            self.lost_from = Some(before);
+            let what = "by the stamps, packets are missing before this one";
+            return Ok(Some((Fault::LostPacket, lost as u64, what)));
+        }
+        if !is_late && goes_on && step_us * 1_000 <= packet_ns + LATE_US * 1_000 {
+            self.time_ns = time_ns;
+            let what = "the sensor's clock was set forward by a little, and no packet is missing";
+            return Ok(Some((Fault::ClockStep, 1, what)));
+        }
+        if !self.follows_suspect(stamp_us, packet_ns) {
+            self.suspect_us = Some(stamp_us);
+            return Err((Fault::BadStamp, "the stamp jumps: the packet is left out"));
+        }
+        self.time_ns = absolute_ns(arrival.host_ns, stamp_us);
+        self.is_break = true;
+        let what = "the recording goes on at another time: the sweep ends here";
+        Ok(Some((Fault::Break, 1, what)))
     }
 
     /// Whether the packet comes shortly after one that was left out for its stamp.
@@ -270,76 +400,51 @@ impl Cycles {
         })
     }
 
-    /// Fills the slots and their azimuths; the packet's one turning rate [0.01°/ns]. None without any block.
-    fn read_slots(&mut self, slot_count: usize) -> Option<f64> {
-        let blocks = BLOCKS / slot_count;
-        for slot in 0..slot_count {
-            let range = slot * blocks..(slot + 1) * blocks;
-            self.slots[slot] = if range.clone().any(|block| self.packet.is_block(block)) {
-                Slot::Received
-            } else if range.clone().all(|block| self.packet.is_absent(block)) {
-                Slot::Absent
-            } else {
-                Slot::Unknown
-            };
-            let block = range.clone().find(|&block| self.packet.is_block(block)).unwrap_or(range.start);
-            self.azimuths_cdeg[slot] = f64::from(self.packet.azimuth_cdeg(block));
-        }
-        let slots = &self.slots[..slot_count];
-        let first = slots.iter().position(|&slot| slot == Slot::Received)?;
-        let last = slots.iter().rposition(|&slot| slot == Slot::Received)?;
-        // rate = ((az(11) - az(0)) mod 36000) / (11 cycles), or over the blocks that there are.
-        let advance_cdeg = (self.azimuths_cdeg[last] - self.azimuths_cdeg[first]).rem_euclid(TURN);
-        let mut rate = advance_cdeg / ((last - first).max(1) as f64 * self.slot_ns() as f64);
-        // Over few blocks the rounding of azimuths to 0.01° would tell more than the rate.
-        let are_few = 2 * (last - first + 1) < slot_count && self.cdeg_per_ns > 0.0;
-        if first == last || are_few || rate > self.max_cdeg_per_ns {
-            rate = self.cdeg_per_ns;
-        }
-        for slot in 0..slot_count {
-            if self.slots[slot] != Slot::Received {
-                let ahead_ns = (slot as f64 - first as f64) * self.slot_ns() as f64;
-                let supposed_cdeg = self.azimuths_cdeg[first] + rate * ahead_ns;
-                // Only the flag may be torn: then the azimuth is where it must be.
-                let off_cdeg = (self.azimuths_cdeg[slot] - supposed_cdeg + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
-                if off_cdeg.abs() > rate * self.slot_ns() as f64 {
-                    self.azimuths_cdeg[slot] = supposed_cdeg.rem_euclid(TURN);
+    /// Reads the packet after the one at hand, which says when the blocks behind a jump were fired. False when it is
+    /// not there yet.
+    fn look_ahead(&mut self, faults: &mut Faults) -> Result<bool, ReplayError> {
+        let next = loop {
+            match self.capture.next(&mut self.ahead, faults)? {
+                // Recorded twice, say.
+                Got::Packet(arrival) if self.ahead.stamp_us() == self.packet.stamp_us() => {
+                    let what = "a packet came twice or late";
+                    faults.note(Fault::LatePacket, 1, self.capture.path(), arrival.place, what);
                 }
+                Got::Packet(arrival) => break Some(arrival),
+                Got::Nothing => return Ok(false),
+                Got::End => break None,
             }
-        }
-        Some(rate)
+        };
+        self.ahead_arrival = next;
+        self.place_jump(next.is_some());
+        Ok(true)
     }
-}
 
-/// Puts a stamp [µs since the top of the hour] into the hour of the host's clock, or the one beside it when the result
-/// would be more than half an hour off. Never before 1970.
-fn absolute_ns(host_ns: u64, stamp_us: u64) -> u64 {
-    let host = i128::from(host_ns);
-    let mut time = host - host % NS_PER_HOUR + i128::from(stamp_us) * 1_000;
-    if time - host > NS_PER_HOUR / 2 && time >= NS_PER_HOUR {
-        time -= NS_PER_HOUR;
-    } else if host - time > NS_PER_HOUR / 2 {
-        time += NS_PER_HOUR;
-    }
-    u64::try_from(time).unwrap_or(0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stamp_goes_into_the_hour_nearest_to_the_hosts_clock() {
-        const HOUR: u64 = HOUR_US * 1_000;
-        let minute = HOUR / 60;
-        for (host, stamp_min, expected) in [
-            (10 * HOUR + 5 * minute, 5, 10 * HOUR + 5 * minute),
-            (10 * HOUR + minute, 59, 9 * HOUR + 59 * minute),
-            (10 * HOUR + 59 * minute, 1, 11 * HOUR + minute),
-            (0, 59, 59 * minute),
-            (0, 0, 0),
-        ] {
-            assert_eq!(absolute_ns(host, stamp_min * 60_000_000), expected, "{host} {stamp_min}");
-        }
+    /// Finds when the blocks behind a jump were fired, by the packet ahead or else by the turning rate, if the jump is
+    /// that of a field of view. One that is not (a torn azimuth) takes no time.
+    fn place_jump(&mut self, is_followed: bool) {
+        self.known = self.slots.count;
+        let (Some(jump), Some(before)) = (self.slots.jump, self.before) else { return };
+        let (slot_ns, slot_cdeg) = (self.slot_ns(), self.slot_cdeg());
+        let azimuths_cdeg = &self.slots.azimuths_cdeg;
+        let gap = Gap::between(azimuths_cdeg[jump - 1], azimuths_cdeg[jump], slot_cdeg);
+        let turning_ns = gap.width_cdeg() / self.cdeg_per_ns.max(f64::MIN_POSITIVE);
+        let rest_ns = (self.slots.present() - jump) as u64 * slot_ns;
+        let end_cdeg = azimuths_cdeg[jump] + self.cdeg_per_ns * rest_ns as f64;
+        let step_us = (self.ahead.stamp_us() + HOUR_US - before.stamp_us) % HOUR_US;
+        let measured_ns = (step_us * 1_000).saturating_sub(before.next_ns - before.time_ns);
+        let off_cdeg = (f64::from(self.ahead.azimuth_cdeg(0)) - end_cdeg + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
+        let agree = (measured_ns as f64 - turning_ns).abs() <= turning_ns / 4.0 + 2.0 * slot_ns as f64;
+        self.jump_ns = if is_followed && agree && off_cdeg.abs() <= 3.0 * slot_cdeg {
+            measured_ns
+        } else if self.gap.is_some_and(|known| known.is_same(&gap)) {
+            (turning_ns / self.cycle_ns as f64).round() as u64 * self.cycle_ns
+        } else {
+            return;
+        };
+        self.gap = Some(gap);
+        self.is_edge = true;
+        let next_ns = before.next_ns + self.jump_ns;
+        self.before = Some(Before { next_ns, next_cdeg: end_cdeg.rem_euclid(TURN), ..before });
     }
 }

@@ -54,6 +54,13 @@ impl Packet {
         self.u16(block * BLOCK_BYTES + 2) % TURN_CDEG
     }
 
+    /// Distance (two bytes) and intensity of each channel of `block`; none where it is no block.
+    pub(crate) fn channels(&self, block: usize) -> Option<&[[u8; 3]; CHANNELS]> {
+        let at = block * BLOCK_BYTES + 4;
+        let (channels, _) = self.bytes.get(at..at + 3 * CHANNELS)?.as_chunks();
+        channels.first_chunk().filter(|_| self.is_block(block))
+    }
+
     /// Distance in counts (0 = no return, whatever the intensity) and intensity of a channel.
     pub(crate) fn channel(&self, block: usize, channel: usize) -> (u16, u8) {
         let at = block * BLOCK_BYTES + 4 + 3 * channel;
@@ -68,6 +75,11 @@ impl Packet {
     /// Return mode; without meaning in old firmware.
     pub(crate) fn return_mode(&self) -> u8 {
         self.bytes[STAMP_AT + 4]
+    }
+
+    /// Factory byte of the sensor's kind; other content in very old firmware.
+    pub(crate) fn product_id(&self) -> u8 {
+        self.bytes[STAMP_AT + 5]
     }
 
     /// Whether blocks come in pairs of equal azimuth, the last returns before the strongest.

@@ -1,11 +1,12 @@
-//! Whether a capture's packets can be those of the sensor supposed.
+//! What the first packets of a capture say of their sensor.
 
 use std::path::PathBuf;
 
 use lidar::SensorModel;
 
 use super::packet::{BLOCKS, HOUR_US, Packet};
-use crate::capture::Capture;
+use super::product::sensor_of;
+use crate::capture::{Capture, Got};
 use crate::error::ReplayError;
 use crate::faults::Faults;
 
@@ -14,45 +15,70 @@ const PROBED: usize = 100;
 /// Fewer of them say nothing.
 const FEW: usize = 8;
 
-/// Looks at the first data packets of `files`.
-///
-/// # Errors
-/// There is none, or they come at another rate: the factory byte cannot tell, as early VLP-16 carry the HDL-32E's.
-pub(crate) fn check_rate(files: &[PathBuf], sensor: &SensorModel) -> Result<(), ReplayError> {
-    let path = files.first().cloned().unwrap_or_default();
-    let mut capture = Capture::new(files.to_vec());
-    // The reader proper will find them again, and count them.
-    let mut faults = Faults::muted();
-    let mut packet = Packet::default();
-    let (mut steps_us, mut before_us) = (Vec::with_capacity(PROBED), None);
-    let mut is_dual = false;
-    let mut is_any = false;
-    while steps_us.len() < PROBED && capture.next(&mut packet, &mut faults)?.is_some() {
-        if !(0..BLOCKS).any(|block| packet.is_block(block)) {
-            continue;
+/// The first data packets of a capture.
+#[derive(Clone, Debug)]
+pub(crate) struct Probe {
+    path: PathBuf,
+    /// Factory byte of the first.
+    product_id: u8,
+    is_dual: bool,
+    /// Usual time between them [µs]; none where there are too few.
+    step_us: Option<u64>,
+}
+
+impl Probe {
+    /// Looks at the first data packets of `capture`, and takes it back to its start.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn of(capture: &mut Capture) -> Result<Self, ReplayError> {
+        let path = capture.path().to_owned();
+        // The reader proper will find them again, and count them.
+        let mut faults = Faults::muted();
+        let mut packet = Packet::default();
+        let (mut steps_us, mut before_us) = (Vec::with_capacity(PROBED), None);
+        let (mut product_id, mut is_dual) = (None, false);
+        while steps_us.len() < PROBED {
+            let Got::Packet(_) = capture.next(&mut packet, &mut faults)? else { break };
+            if !(0..BLOCKS).any(|block| packet.is_block(block)) {
+                continue;
+            }
+            product_id = product_id.or(Some(packet.product_id()));
+            is_dual = packet.is_dual();
+            let stamp_us = packet.stamp_us() % HOUR_US;
+            if let Some(before_us) = before_us.replace(stamp_us) {
+                let step_us = (stamp_us + HOUR_US - before_us) % HOUR_US;
+                // Recorded twice, on two interfaces say.
+                steps_us.extend((step_us > 0).then_some(step_us));
+            }
         }
-        is_any = true;
-        is_dual = packet.is_dual();
-        let stamp_us = packet.stamp_us() % HOUR_US;
-        if let Some(before_us) = before_us.replace(stamp_us) {
-            let step_us = (stamp_us + HOUR_US - before_us) % HOUR_US;
-            // Recorded twice, on two interfaces say.
-            steps_us.extend((step_us > 0).then_some(step_us));
+        capture.rewind();
+        let Some(product_id) = product_id else {
+            let what = "holds no Velodyne data packet (1206 bytes with blocks FF EE)".to_owned();
+            return Err(ReplayError::Empty { path, what });
+        };
+        steps_us.sort_unstable();
+        let step_us = (steps_us.len() >= FEW).then(|| steps_us[steps_us.len() / 2]);
+        Ok(Self { path, product_id, is_dual, step_us })
+    }
+
+    /// The sensor model that the factory byte names; very old firmware has other content there.
+    pub(crate) fn sensor(&self) -> Option<&'static str> {
+        sensor_of(self.product_id)
+    }
+
+    /// Whether the packets can be those of `sensor`: the factory byte cannot tell, as early VLP-16 carry the HDL-32E's.
+    ///
+    /// # Errors
+    /// They come at another rate.
+    pub(crate) fn check_rate(self, sensor: &SensorModel) -> Result<(), ReplayError> {
+        let Some(found_us) = self.step_us else { return Ok(()) };
+        let cycles = BLOCKS as u64 * u64::from(sensor.cycles_per_block()) / if self.is_dual { 2 } else { 1 };
+        let expected_us = (cycles * u64::from(sensor.cycle_ns()) + 500) / 1_000;
+        if found_us.abs_diff(expected_us) * 5 > expected_us {
+            let sensor = sensor.name().to_owned();
+            return Err(ReplayError::OtherSensor { path: self.path, sensor, found_us, expected_us });
         }
+        Ok(())
     }
-    if !is_any {
-        let what = "holds no Velodyne data packet (a UDP datagram of 1206 bytes with blocks FF EE)".to_owned();
-        return Err(ReplayError::Empty { path, what });
-    }
-    if steps_us.len() < FEW {
-        return Ok(());
-    }
-    steps_us.sort_unstable();
-    let found_us = steps_us[steps_us.len() / 2];
-    let cycles = BLOCKS as u64 * u64::from(sensor.cycles_per_block()) / if is_dual { 2 } else { 1 };
-    let expected_us = (cycles * u64::from(sensor.cycle_ns()) + 500) / 1_000;
-    if found_us.abs_diff(expected_us) * 5 > expected_us {
-        return Err(ReplayError::OtherSensor { path, sensor: sensor.name().to_owned(), found_us, expected_us });
-    }
-    Ok(())
 }

@@ -1,11 +1,14 @@
 //! Firing cycles gathered into sweeps, channels turned into positions.
+//!
+//! A sweep begins where the azimuth wraps, or behind the gap of a sensor that is set to less than a whole turn: then the
+//! wrap lies within what it sees, and is no place to cut.
 
 use std::f64::consts::{PI, TAU};
 
 use lidar::{Column, MAX_COLUMNS, Return, SensorModel};
 use messages::Sweep;
 
-use super::cycles::{Cycle, Cycles};
+use super::cycles::{Cycle, Cycles, Step};
 use super::packet::{CHANNELS, TURN_CDEG};
 use crate::capture::Capture;
 use crate::error::ReplayError;
@@ -27,7 +30,45 @@ struct Beam {
     turned: (f64, f64),
 }
 
-/// Sweeps of a capture, cut where the azimuth wraps.
+impl Beam {
+    /// Where a return is [m] whose column's sine and cosine of azimuth, clockwise, are known.
+    #[inline]
+    fn position_m(&self, (sin_column, cos_column): (f64, f64), range_m: f64) -> [f64; 3] {
+        // az(b, c) = az(b) + rate * offset(c), by the addition theorems.
+        let (cos_turn, sin_turn) = self.turned;
+        let cos_azimuth = cos_column * cos_turn - sin_column * sin_turn;
+        let sin_azimuth = sin_column * cos_turn + cos_column * sin_turn;
+        [
+            range_m * self.cos_elevation * cos_azimuth,
+            -range_m * self.cos_elevation * sin_azimuth,
+            range_m * self.sin_elevation,
+        ]
+    }
+}
+
+/// What became of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// It is done.
+    Sweep,
+    /// It is not: a live sensor is silent for now.
+    Nothing,
+    /// The capture has ended before its first cycle.
+    End,
+}
+
+/// A sweep that is being gathered.
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    first: Cycle,
+    last: Cycle,
+    turned_cdeg: f64,
+    /// Azimuth of the block begun last. Cut between blocks: the second cycle of a block may lie beyond the wrap and yet
+    /// belong to the turn.
+    block_cdeg: f64,
+}
+
+/// Sweeps of a capture.
 pub(crate) struct Sweeps {
     cycles: Cycles,
     sensor: SensorModel,
@@ -35,6 +76,7 @@ pub(crate) struct Sweeps {
     is_dual_kept: bool,
     beams: Vec<Beam>,
     beams_rate: f64,
+    open: Option<Open>,
     /// First cycle of the next sweep.
     pending: Option<Cycle>,
     /// The next sweep was seen from its wrap.
@@ -64,66 +106,107 @@ impl Sweeps {
             is_dual_kept,
             beams: beams.collect(),
             beams_rate: f64::NAN,
+            open: None,
             pending: None,
             begins_whole: false,
             period_ns: None,
         })
     }
 
+    /// See [`Cycles::look_for_gap`]. Not for live sensors, which show it as they go.
+    pub(crate) fn look_for_gap(&mut self) -> Result<(), ReplayError> {
+        self.cycles.look_for_gap()
+    }
+
     /// Starts again with the capture's first packet.
     pub(crate) fn rewind(&mut self) {
         self.cycles.rewind();
+        self.open = None;
         self.pending = None;
     }
 
-    /// Fills `sweep` with the next turn; false at the capture's end.
-    pub(crate) fn next(&mut self, sweep: &mut Sweep, faults: &mut Faults) -> Result<bool, ReplayError> {
-        let first = match self.pending.take() {
-            Some(cycle) => cycle,
-            None => match self.cycles.next(faults)? {
-                Some(cycle) => cycle,
-                None => return Ok(false),
-            },
+    /// Where the packets come from.
+    pub(crate) fn capture(&mut self) -> &mut Capture {
+        self.cycles.capture()
+    }
+
+    /// Fills `sweep` with the next turn. Where nothing came yet, it wants the same sweep again, as it is.
+    pub(crate) fn next(&mut self, sweep: &mut Sweep, faults: &mut Faults) -> Result<Progress, ReplayError> {
+        let mut open = match self.open.take() {
+            Some(open) => open,
+            None => {
+                let first = match self.pending.take() {
+                    Some(cycle) => cycle,
+                    None => match self.cycles.next(faults)? {
+                        Step::Cycle(cycle) => cycle,
+                        Step::Nothing => return Ok(Progress::Nothing),
+                        Step::End => return Ok(Progress::End),
+                    },
+                };
+                self.begin(first, sweep)
+            }
         };
+        let ends_whole = loop {
+            let cycle = match self.cycles.next(faults)? {
+                Step::Cycle(cycle) => cycle,
+                Step::Nothing => {
+                    self.open = Some(open);
+                    return Ok(Progress::Nothing);
+                }
+                Step::End => break self.reaches_wrap(open.block_cdeg),
+            };
+            let is_beyond = cycle.begins_block && open.block_cdeg - cycle.azimuth_cdeg > TURN / 2.0;
+            let wraps = is_beyond && !self.cycles.has_gap();
+            if cycle.is_break || cycle.is_edge || wraps || sweep.columns.len() == MAX_COLUMNS {
+                self.pending = Some(cycle);
+                break if cycle.is_break { self.reaches_wrap(open.block_cdeg) } else { wraps };
+            }
+            // Signed, so that a head that stands still or trembles does not turn.
+            let step = (cycle.azimuth_cdeg - open.last.azimuth_cdeg + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
+            open.turned_cdeg += step;
+            open.last = cycle;
+            if cycle.begins_block {
+                open.block_cdeg = cycle.azimuth_cdeg;
+            }
+            self.put(cycle, open.first.time_ns, sweep);
+        };
+        self.end(open, ends_whole, sweep);
+        Ok(Progress::Sweep)
+    }
+
+    /// Ends the sweep that is being gathered where it is, incomplete; false if there is none. What comes next does not
+    /// go on from it.
+    pub(crate) fn flush(&mut self, sweep: &mut Sweep) -> bool {
+        let Some(open) = self.open.take() else { return false };
+        self.end(open, false, sweep);
+        self.cycles.interrupt();
+        true
+    }
+
+    fn begin(&mut self, first: Cycle, sweep: &mut Sweep) -> Open {
         if first.is_break {
             // Seen from its wrap when the block before the first must have been in the turn before.
             let block_step_cdeg = self.step_cdeg() * f64::from(self.sensor.cycles_per_block());
-            self.begins_whole = first.azimuth_cdeg < block_step_cdeg;
+            self.begins_whole = first.azimuth_cdeg < block_step_cdeg && !self.cycles.has_gap();
         }
         for &ring in self.sensor.rings() {
             // A model has at most as many rings as a message.
             let _ = sweep.rings.push(ring);
         }
-        let (mut last, mut turned_cdeg) = (first, 0.0);
-        // Cut between blocks: the second cycle of a block may lie beyond the wrap and yet belong to the turn.
-        let mut block_cdeg = first.azimuth_cdeg;
         self.put(first, first.time_ns, sweep);
-        let ends_whole = loop {
-            let Some(cycle) = self.cycles.next(faults)? else { break self.reaches_wrap(block_cdeg) };
-            let wraps = cycle.begins_block && block_cdeg - cycle.azimuth_cdeg > TURN / 2.0;
-            if cycle.is_break || wraps || sweep.columns.len() == MAX_COLUMNS {
-                self.pending = Some(cycle);
-                break if cycle.is_break { self.reaches_wrap(block_cdeg) } else { wraps };
-            }
-            // Signed, so that a head that stands still or trembles does not turn.
-            let step = (cycle.azimuth_cdeg - last.azimuth_cdeg + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
-            turned_cdeg += step;
-            last = cycle;
-            if cycle.begins_block {
-                block_cdeg = cycle.azimuth_cdeg;
-            }
-            self.put(cycle, first.time_ns, sweep);
-        };
+        Open { first, last: first, turned_cdeg: 0.0, block_cdeg: first.azimuth_cdeg }
+    }
+
+    fn end(&mut self, open: Open, ends_whole: bool, sweep: &mut Sweep) {
         let is_complete = self.begins_whole && ends_whole;
-        self.finish(sweep, first, last, turned_cdeg, is_complete);
+        self.finish(sweep, open.first, open.last, open.turned_cdeg, is_complete);
         self.begins_whole = ends_whole;
-        Ok(true)
     }
 
     /// Whether the block after one at `block_cdeg` would have begun the next turn, give or take half a block.
     fn reaches_wrap(&self, block_cdeg: f64) -> bool {
         let block_step_cdeg = self.step_cdeg() * f64::from(self.sensor.cycles_per_block());
-        block_step_cdeg > 0.0 && block_cdeg + 1.5 * block_step_cdeg > TURN
+        block_step_cdeg > 0.0 && block_cdeg + 1.5 * block_step_cdeg > TURN && !self.cycles.has_gap()
     }
 
     /// Azimuth from cycle to cycle over the packet at hand [0.01°].
@@ -167,37 +250,36 @@ impl Sweeps {
         let Some((slot, half)) = cycle.at else { return };
 
         self.turn_beams();
-        let blocks = self.cycles.blocks_per_slot();
-        let (sin_column, cos_column) = azimuth_rad.sin_cos();
+        const NONE: &[[u8; 3]] = &[[0; 3]; CHANNELS];
         let lasers = self.beams.len();
-        for (laser, beam) in self.beams.iter().enumerate() {
-            let channel = half * lasers + laser;
-            debug_assert!(channel < CHANNELS);
-            let packet = self.cycles.packet();
-            let echo = |block: usize| if packet.is_block(block) { packet.channel(block, channel) } else { (0, 0) };
-            let echoes = match (blocks, self.is_dual_kept) {
-                (1, _) => [echo(slot), (0, 0)],
-                (_, false) => [echo(slot * 2 + 1), (0, 0)],
-                // The same echo twice is one return.
-                (_, true) if echo(slot * 2) == echo(slot * 2 + 1) => [echo(slot * 2), (0, 0)],
-                (_, true) => [echo(slot * 2), echo(slot * 2 + 1)],
-            };
-            for (distance, intensity) in echoes {
-                if distance == 0 {
-                    continue;
-                }
-                let range_m = f64::from(distance) * self.sensor.quantum_m();
-                // az(b, c) = az(b) + rate * offset(c), by the addition theorems.
-                let (cos_turn, sin_turn) = beam.turned;
-                let cos_azimuth = cos_column * cos_turn - sin_column * sin_turn;
-                let sin_azimuth = sin_column * cos_turn + cos_column * sin_turn;
-                let position_m = [
-                    range_m * beam.cos_elevation * cos_azimuth,
-                    -range_m * beam.cos_elevation * sin_azimuth,
-                    range_m * beam.sin_elevation,
-                ];
+        let packet = self.cycles.packet();
+        // A second cycle's channels lie behind those of the first.
+        let channels = |block| packet.channels(block).and_then(|all| all.get(half * lasers..)).unwrap_or(NONE);
+        // In dual-return mode the last returns come before the strongest.
+        let (one, other) = match (self.cycles.blocks_per_slot(), self.is_dual_kept) {
+            (1, _) => (channels(slot), None),
+            (_, false) => (channels(slot * 2 + 1), None),
+            (_, true) => (channels(slot * 2), Some(channels(slot * 2 + 1))),
+        };
+        let column = azimuth_rad.sin_cos();
+        let (limits, quantum_m) = (&self.limits, self.sensor.quantum_m());
+        let put = |sweep: &mut Sweep, beam: &Beam, [low, high, intensity]: [u8; 3]| {
+            let distance = u16::from_le_bytes([low, high]);
+            if distance != 0 {
                 let at = Return { column: index, ring: beam.ring, intensity, ..Return::default() };
-                take(sweep, &self.limits, position_m, at);
+                take(sweep, limits, beam.position_m(column, f64::from(distance) * quantum_m), at);
+            }
+        };
+        match other {
+            None => self.beams.iter().zip(one).for_each(|(beam, &echo)| put(sweep, beam, echo)),
+            Some(other) => {
+                for (beam, (&echo, &second)) in self.beams.iter().zip(one.iter().zip(other)) {
+                    put(sweep, beam, echo);
+                    // The same echo twice is one return.
+                    if second != echo {
+                        put(sweep, beam, second);
+                    }
+                }
             }
         }
     }
