@@ -30,12 +30,9 @@ pub(crate) fn check(outputs: &[(&str, Option<&Path>)], source: &Path) -> Result<
     Ok(())
 }
 
-/// The files that a source is made of.
+/// The files that a source is made of; a name that nothing has yet is itself.
 fn inputs(source: &Path) -> Vec<PathBuf> {
-    match fs::read_dir(source) {
-        Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
-        Err(_) => vec![source.to_owned()],
-    }
+    replay::matched(source).unwrap_or_else(|_| vec![source.to_owned()])
 }
 
 /// A pipe or a device: opening it may wait, and nothing in it can be destroyed.

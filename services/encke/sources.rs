@@ -27,12 +27,16 @@ pub(crate) fn locate(from: &Path, assets: &Assets) -> Result<PathBuf, Failure> {
     if from.exists() {
         return from.canonicalize().map_err(|cause| Failure::start(format!("{}: {cause}", from.display())));
     }
+    // A pattern is found again by other processes from the root on.
+    if replay::matched(from).is_ok() {
+        return std::path::absolute(from).map_err(|cause| Failure::start(format!("{}: {cause}", from.display())));
+    }
     let in_config = from.strip_prefix("config").unwrap_or(from);
     if is_scene(from) && assets.bytes(&in_config.to_string_lossy()).is_ok() {
         return Ok(in_config.to_owned());
     }
     Err(Failure::start(format!(
-        "{}: no such file or folder; --from takes a scene (.toml) or a recording",
+        "{}: no such file or folder, and no pattern that a file matches; --from takes a scene (.toml) or a recording",
         from.display()
     )))
 }

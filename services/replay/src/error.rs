@@ -23,6 +23,14 @@ pub enum ReplayError {
         /// What its first bytes are.
         found: String,
     },
+    /// The pattern of file names is none, or nothing matches it.
+    #[error("{}: {what}; give a file, a folder, or a pattern such as 'folder/*.pcd', in quotes", path.display())]
+    Pattern {
+        /// The pattern.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// The folder holds no file in a known format.
     #[error("{}: holds no recording among its {files} files; known by their content are {}", path.display(), Format::list())]
     NoRecording {

@@ -20,30 +20,67 @@ pub(crate) fn head(path: &Path) -> Result<Vec<u8>, ReplayError> {
     Ok(head)
 }
 
+/// The files that `path` stands for, in name order: itself, those of a folder, or those that match a pattern (`*`, `?`,
+/// `[…]`, `**`). What exists is no pattern. Folders and hidden files are none of a recording's. Nothing where the path is
+/// a file.
+fn several(path: &Path) -> Result<Option<Vec<PathBuf>>, ReplayError> {
+    let io = |source| ReplayError::Io { path: path.to_owned(), source };
+    let is_hidden = |file: &Path| file.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+    let mut files = Vec::new();
+    match std::fs::metadata(path) {
+        Ok(metadata) if !metadata.is_dir() => return Ok(None),
+        Ok(_) => {
+            for entry in std::fs::read_dir(path).map_err(io)? {
+                let file = entry.map_err(io)?.path();
+                if file.is_file() && !is_hidden(&file) {
+                    files.push(file);
+                }
+            }
+        }
+        Err(source) => {
+            let Some(pattern) = pattern(path) else { return Err(io(source)) };
+            let bad = |what: String| ReplayError::Pattern { path: path.to_owned(), what };
+            let options = glob::MatchOptions { require_literal_leading_dot: true, ..glob::MatchOptions::new() };
+            for file in glob::glob_with(pattern, options).map_err(|error| bad(error.to_string()))? {
+                // Folders that may not be read hold no file that could be.
+                files.extend(file.ok().filter(|file| file.is_file()));
+            }
+            if files.is_empty() {
+                return Err(bad("no file matches".to_owned()));
+            }
+        }
+    }
+    files.sort();
+    Ok(Some(files))
+}
+
+/// The path as a pattern, if it is one.
+fn pattern(path: &Path) -> Option<&str> {
+    path.to_str().filter(|text| text.contains(['*', '?', '[']))
+}
+
+/// The files that `from` stands for, in name order: itself, those of a folder, or those that match a pattern. Their
+/// content is not looked at.
+///
+/// # Errors
+/// The path is not there, and is no pattern or one that nothing matches.
+pub fn matched(from: &Path) -> Result<Vec<PathBuf>, ReplayError> {
+    Ok(several(from)?.unwrap_or_else(|| vec![from.to_owned()]))
+}
+
 /// The files of a recording in name order, and their format: found by content unless it is `forced`.
 pub(crate) fn find(
     path: &Path,
     forced: Option<Format>,
     faults: &mut Faults,
 ) -> Result<(Vec<PathBuf>, Format), ReplayError> {
-    let io = |source| ReplayError::Io { path: path.to_owned(), source };
-    if !std::fs::metadata(path).map_err(io)?.is_dir() {
+    let Some(files) = several(path)? else {
         let format = match forced {
             Some(format) => format,
             None => told(path)?.map_err(|found| ReplayError::UnknownFormat { path: path.to_owned(), found })?,
         };
         return Ok((vec![path.to_owned()], format));
-    }
-
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(io)? {
-        let file = entry.map_err(io)?.path();
-        let is_hidden = file.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
-        if file.is_file() && !is_hidden {
-            files.push(file);
-        }
-    }
-    files.sort();
+    };
 
     let mut found: Vec<(PathBuf, Format)> = Vec::new();
     let mut others: Vec<(&PathBuf, String)> = Vec::new();

@@ -1,6 +1,6 @@
-//! Recorded data → Sweep: packet captures, tables and point clouds as a source of the chain.
+//! Recorded data → Sweep: packet captures, tables, point clouds and MCAP files as a source of the chain.
 //!
-//! A recording is a file, or a folder of files of one format; the format is found by content. Geometry stays in the
+//! A recording is a file, or files of one format in a folder or by a pattern; the format is found by content. Geometry stays in the
 //! recording's own sensor frame (packets: x forward, y left, z up). What is intact is used; what is not is counted by
 //! reason, returns in the sweep's header, the rest in [`Faults`], and named once with file and place.
 //!
@@ -26,6 +26,7 @@ mod velodyne;
 
 pub use error::{Place, ReplayError};
 pub use faults::{Fault, Faults};
+pub use files::matched;
 pub use format::{Format, UnknownFormat};
 pub use live::{Live, LiveAddress, LiveAddressError, Traffic, listen};
 pub use recording::{Options, Recording, SensorLookup, open};

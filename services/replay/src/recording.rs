@@ -57,7 +57,7 @@ enum Reader {
     Raw(Box<RawSweeps>),
 }
 
-/// Opens a recording: a file, or a folder of files in name order. The format is found by content.
+/// Opens a recording: a file, or the files of a folder or of a pattern in name order. The format is found by content.
 ///
 /// Packets and messages are read as they are needed; of clouds one is read ahead.
 ///
@@ -80,7 +80,26 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
             sweeps.look_for_gap()?;
             Reader::Packets(Box::new(sweeps))
         }
-        None => Reader::Clouds(Box::new(Clouds::new(files, format, &sensor, limits, &mut faults)?)),
+        Format::Mcap => {
+            let messages = Messages::open(files, options.topic.as_deref())?;
+            match messages.kind() {
+                Kind::Raw => {
+                    // As recorded, whatever the sensor model says: only what the caller asks for is refused.
+                    let asked = (options.min_range_m, options.max_range_m);
+                    let (near_m, far_m) = (asked.0.unwrap_or(0.0), asked.1.unwrap_or(f64::from(f32::MAX)));
+                    let limits = Limits::checked(near_m, far_m)?;
+                    Reader::Raw(Box::new(RawSweeps::new(messages, (asked != (None, None)).then_some(limits))?))
+                }
+                Kind::PointCloud2 | Kind::PointCloud2Ros1 | Kind::Foxglove => {
+                    let source = Box::new(MessageClouds::new(messages));
+                    Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
+                }
+            }
+        }
+        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti => {
+            let source = Box::new(CloudFiles::new(files, format));
+            Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
+        }
     };
     Ok(Recording {
         reader,

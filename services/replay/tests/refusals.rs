@@ -20,7 +20,7 @@ fn line(result: Result<replay::Recording, ReplayError>) -> String {
 fn each_kind_of_bad_input_names_file_place_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let pcd = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
-    let cases: [(&str, &[u8], &[&str]); 14] = [
+    let cases: [(&str, &[u8], &[&str]); 27] = [
         ("empty", b"", &["is empty", "--format"]),
         (
             "magic",
@@ -39,6 +39,23 @@ fn each_kind_of_bad_input_names_file_place_and_remedy() {
         ("type.pcd", b"FIELDS x y z\nSIZE 4 4 2\nTYPE F F F\nPOINTS 1\nDATA ascii\n", &["field z is F with 2 bytes"]),
         ("xy.pcd", b"FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n", &["must name x, y and z"]),
         ("packed.pcd", &pcd_of(pcd, "POINTS 9\nDATA binary_compressed\n\x01\0\0\0\x6c\0\0\0a"), &["byte", "cut off"]),
+        ("no-end.ply", b"ply\nformat ascii 1.0\n", &["line 3", "end_header"]),
+        ("format.ply", b"ply\nformat utf-8 1.0\nend_header\n", &["line 2", "utf-8", "must be format ascii"]),
+        ("no-format.ply", b"ply\nelement vertex 1\nend_header\n", &["line 3", "no line format"]),
+        (
+            "element.ply",
+            b"ply\nformat ascii 1.0\nelement vertex -1\nend_header\n",
+            &["line 3", "vertex -1", "a number"],
+        ),
+        ("property.ply", b"ply\nformat ascii 1.0\nproperty float x\n", &["line 3", "below an element"]),
+        ("kind.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\n", &["line 4", "half", "KIND"]),
+        ("list.ply", b"ply\nformat ascii 1.0\nelement a 1\nproperty list float int x\n", &["line 4", "an integer"]),
+        ("word.ply", b"ply\nformat ascii 1.0\nvertices 3\n", &["line 3", "vertices 3", "must be format"]),
+        ("no-vertex.ply", b"ply\nformat ascii 1.0\nend_header\n", &["line 3", "no element vertex"]),
+        ("no-z.ply", &ply_of("ascii", 1, "xy"), &["line 6", "no property z"]),
+        ("no-points.ply", &ply_of("ascii", 0, "xyz"), &["holds no points"]),
+        ("huge.ply", &ply_of("binary_big_endian", u64::MAX, "xyz"), &["holds no points"]),
+        ("version.mcap", b"\x89MCAP9\r\n", &["byte 0", "version 0", ".mcap"]),
     ];
     for (name, bytes, words) in cases {
         let path = folder.path().join(name);
@@ -53,6 +70,11 @@ fn each_kind_of_bad_input_names_file_place_and_remedy() {
 
 fn pcap_header() -> Vec<u8> {
     [0xa1b2_c3d4_u32, 4 << 16 | 2, 0, 0, 65_535, 1].iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+fn ply_of(encoding: &str, points: u64, names: &str) -> Vec<u8> {
+    let properties: String = names.chars().map(|name| format!("property float {name}\n")).collect();
+    format!("ply\nformat {encoding} 1.0\nelement vertex {points}\n{properties}end_header\n").into_bytes()
 }
 
 fn pcd_of(head: &str, rest: &str) -> Vec<u8> {

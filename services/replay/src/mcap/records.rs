@@ -59,17 +59,16 @@ pub(super) struct Records {
 impl Records {
     /// The records of the data section.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
-        let mut file = File::open(path)?;
+        let file = File::open(path)?;
         let length = file.metadata()?.len();
-        let mut magic = [0; MAGIC.len()];
-        match file.read_exact(&mut magic) {
-            Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => return Err(error),
-            _ if magic == MAGIC => Ok(Self::from(file, length, MAGIC.len() as u64)),
-            _ => {
-                let what = "the file does not begin with the mark of MCAP, version 0";
-                Err(io::Error::new(io::ErrorKind::InvalidData, what))
-            }
+        let mut magic = Vec::new();
+        let mut file = BufReader::with_capacity(1 << 16, file);
+        file.by_ref().take(MAGIC.len() as u64).read_to_end(&mut magic)?;
+        if magic != MAGIC {
+            let what = "the file does not begin with the mark of MCAP, version 0";
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
+        Ok(Self::from(file, length, MAGIC.len() as u64))
     }
 
     /// The records of the summary, where the file is whole and has one.
@@ -85,12 +84,12 @@ impl Records {
         let start = u64::from_le_bytes(footer.get(range)?.get(..8)?.try_into().ok()?);
         let is_summary = opcode == op::FOOTER && magic == MAGIC && (MAGIC.len() as u64..length).contains(&start);
         file.seek(SeekFrom::Start(start)).ok()?;
-        is_summary.then(|| Self::from(file, length, start))
+        is_summary.then(|| Self::from(BufReader::new(file), length, start))
     }
 
-    fn from(file: File, length: u64, offset: u64) -> Self {
+    fn from(file: BufReader<File>, length: u64, offset: u64) -> Self {
         Self {
-            file: BufReader::with_capacity(1 << 16, file),
+            file,
             length,
             offset,
             record: Vec::new(),

@@ -2,6 +2,8 @@
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+pub mod container;
+
 use std::path::{Path, PathBuf};
 
 use lidar::{SensorFile, SensorModel};
