@@ -1,8 +1,8 @@
 //! What a sweep's time went into, by stage.
 
 use super::figures::{RunFigures, Spent, Timeline};
-use super::parts::{BLUE, ORANGE, PINK, SKY, Times, WIDE, absent, colour, key, ms};
-use super::plot::{Axis, Plot, Series, Shape};
+use super::parts::{BLUE, ORANGE, PINK, SKY, Times, WIDE, absent, colour, key, ms, steps};
+use super::plot::{Axis, Plot};
 use crate::page::{escaped, figure};
 
 pub(crate) fn section(figures: &RunFigures) -> String {
@@ -83,16 +83,15 @@ fn over_time(figures: &RunFigures, timeline: &Timeline) -> String {
         return String::new();
     }
     let times = Times::of(figures);
-    let x: Vec<f64> =
-        answered.iter().map(|&place| times.at(timeline.latency_ms[place].t_s + timeline.bucket_s / 2.0)).collect();
-    let mut below: Vec<f64> = vec![0.0; x.len()];
+    let begins: Vec<f64> = answered.iter().map(|&place| times.at(timeline.latency_ms[place].t_s)).collect();
+    let width = times.at(timeline.bucket_s);
+    let mut below: Vec<f64> = vec![0.0; begins.len()];
     let mut series = Vec::new();
     for (place, stage) in timeline.spent_ms.iter().enumerate() {
         let all = [&stage.late, &stage.transport, &stage.queued, &stage.busy];
         let sum = |bucket: usize| all.iter().filter_map(|values| values.get(bucket)).sum::<f64>().max(0.0);
         let above: Vec<f64> = answered.iter().zip(&below).map(|(&bucket, below)| below + sum(bucket)).collect();
-        let along = |ys: &[f64]| x.iter().copied().zip(ys.iter().copied()).collect::<Vec<_>>();
-        series.push(Series { colour: colour(place), shape: Shape::Area(along(&below)), points: along(&above) });
+        series.extend(steps(&begins, width, &above, &below, colour(place)));
         below = above;
     }
     let plot = Plot {

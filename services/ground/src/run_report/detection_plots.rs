@@ -1,8 +1,10 @@
 //! What was detected: by class, and over time.
 
-use super::figures::RunFigures;
-use super::parts::{Times, WIDE, absent, bar, class_colour, count, key};
-use super::plot::{Axis, Plot, Series, Shape};
+use std::ops::Range;
+
+use super::figures::{RunFigures, Timeline};
+use super::parts::{Times, WIDE, absent, bar, class_colour, count, key, steps};
+use super::plot::{Axis, Plot};
 use crate::page::{escaped, figure};
 
 /// Classes in the order in which they stand.
@@ -40,25 +42,23 @@ fn over_time(figures: &RunFigures, classes: &[&str]) -> String {
         return String::new();
     };
     let times = Times::of(figures);
-    // A mean over the answered sweeps: the number of sweeps in a bucket would show otherwise.
-    let answered: Vec<(usize, f64)> = (timeline.latency_ms.iter().enumerate())
-        .filter(|(_, bucket)| bucket.sweeps > 0)
-        .map(|(place, bucket)| (place, bucket.sweeps as f64))
-        .collect();
-    if answered.len() < 2 {
+    let groups = groups(timeline);
+    if groups.len() < 2 {
         return String::new();
     }
-    let x: Vec<f64> =
-        answered.iter().map(|&(place, _)| times.at(timeline.latency_ms[place].t_s + timeline.bucket_s / 2.0)).collect();
-    let along = |ys: &[f64]| x.iter().copied().zip(ys.iter().copied()).collect::<Vec<_>>();
-    let mut below = vec![0.0; x.len()];
+    let begins: Vec<f64> = groups.iter().map(|group| times.at(timeline.latency_ms[group.start].t_s)).collect();
+    let width = times.at(groups.last().map_or(1, Range::len) as f64 * timeline.bucket_s);
+    let mut below = vec![0.0; begins.len()];
     let (mut series, mut entries) = (Vec::new(), Vec::new());
     for class in classes {
         let Some(counts) = timeline.detections.get(*class) else { continue };
-        let mean = |&(place, sweeps): &(usize, f64)| counts.get(place).copied().unwrap_or(0) as f64 / sweeps;
-        let above: Vec<f64> = answered.iter().zip(&below).map(|(bucket, below)| below + mean(bucket)).collect();
+        let mean = |group: &Range<usize>| {
+            let sweeps: u64 = timeline.latency_ms[group.clone()].iter().map(|bucket| bucket.sweeps).sum();
+            counts.iter().take(group.end).skip(group.start).sum::<u64>() as f64 / sweeps.max(1) as f64
+        };
+        let above: Vec<f64> = groups.iter().zip(&below).map(|(group, below)| below + mean(group)).collect();
         let colour = class_colour(class);
-        series.push(Series { colour, shape: Shape::Area(along(&below)), points: along(&above) });
+        series.extend(steps(&begins, width, &above, &below, colour));
         entries.push((colour, *class));
         below = above;
     }
@@ -71,5 +71,29 @@ fn over_time(figures: &RunFigures, classes: &[&str]) -> String {
         moments: times.moments(&timeline.events),
     };
     key(&entries, &[])
-        + &figure(&plot.svg(), "Detections by class over time, one above the other: mean of the answered sweeps.")
+        + &figure(
+            &plot.svg(),
+            "Detections by class over time, one above the other: means of at least ten answered sweeps.",
+        )
+}
+
+/// Least answered sweeps of a group.
+const GROUP: u64 = 10;
+
+/// Neighbouring buckets, so many that a mean over their sweeps says something: a sweep's sectors may lie in two of them.
+fn groups(timeline: &Timeline) -> Vec<Range<usize>> {
+    let mut groups = Vec::new();
+    let (mut start, mut sweeps) = (0, 0);
+    for (place, bucket) in timeline.latency_ms.iter().enumerate() {
+        let before = place.checked_sub(1).and_then(|before| timeline.latency_ms.get(before));
+        if before.is_some_and(|before| bucket.t_s - before.t_s > 4.0 * timeline.bucket_s) {
+            (start, sweeps) = (place, 0);
+        }
+        sweeps += bucket.sweeps;
+        if sweeps >= GROUP {
+            groups.push(start..place + 1);
+            (start, sweeps) = (place + 1, 0);
+        }
+    }
+    groups
 }

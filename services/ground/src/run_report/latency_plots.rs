@@ -1,7 +1,9 @@
 //! Latency: its distribution, and how it went over time.
 
 use super::figures::{LatencyBucket, Percentiles, Points, RunFigures};
-use super::parts::{BLUE, GREEN, ORANGE, PINK, RED, SKY, Times, WIDE, absent, count, key, maybe_ms, ms, pieces};
+use super::parts::{
+    BLUE, DARK, GREEN, ORANGE, PINK, RED, SKY, Times, WIDE, absent, count, key, maybe_ms, moment_words, ms, pieces,
+};
 use super::plot::{Axis, Plot, Series, Shape, plain};
 use crate::page::figure;
 
@@ -133,7 +135,7 @@ fn over_time(figures: &RunFigures) -> String {
             _ => Series { colour, shape: Shape::Line(width), points },
         }));
     }
-    series.push(Series { colour: "#444444", shape: Shape::Dots(2), points: max });
+    series.push(Series { colour: DARK, shape: Shape::Dots(2), points: max });
     let y = Axis::log("end to end [ms]", least.max(most * 1e-5), most);
     let missed = timeline.latency_ms.iter().filter(|bucket| bucket.misses + bucket.missing > 0);
     let missed: Vec<_> = missed.map(|bucket| (times.at(bucket.t_s + timeline.bucket_s / 2.0), y.range.start)).collect();
@@ -147,16 +149,14 @@ fn over_time(figures: &RunFigures) -> String {
         levels: deadline.map(|at| (format!("deadline {} ms", plain(at)), RED, at)).into_iter().collect(),
         moments: times.moments(&timeline.events),
     };
-    let mut entries = vec![(BLUE, "p50"), (SKY, "p99"), ("#444444", "longest")];
+    let mut entries = vec![(BLUE, "p50"), (SKY, "p99"), (DARK, "longest")];
     if any_missed {
         entries.push((RED, "on the axis: sweeps missed their deadline or never came"));
     }
     let mut dashed: Vec<(&str, &str)> = deadline.map(|_| (RED, "deadline")).into_iter().collect();
-    if !timeline.events.is_empty() {
-        dashed.push((PINK, "upright, numbered: restarts and steps of the ladder, listed under Events"));
-    }
+    dashed.extend(moment_words(&timeline.events));
     let caption = format!(
-        "Sweeps of {} s each, counted when they were answered. Median and p99 are within 3 %, the longest is exact: {} ms.",
+        "Buckets of {} s; sweeps count when they were answered. Median and p99 are within 3 %, the longest is exact: {} ms.",
         plain(timeline.bucket_s),
         ms(figures.latency_ms.end_to_end.max.unwrap_or(0.0))
     );

@@ -13,18 +13,18 @@ p,figcaption{max-width:60em}.key{font:13px/1.5 sans-serif;margin:10px 0 2px;disp
 .verdict{border-left:6px solid;padding:8px 14px;margin:14px 0;background:#f4f4f2}.verdict.fine{border-color:#009E73}\
 .verdict.fair{border-color:#E69F00}.verdict.bad{border-color:#D55E00}.sign{font:700 18px sans-serif;margin-right:4px}\
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(116px,1fr));gap:8px;margin:14px 0 4px;font-family:sans-serif}\
-.tiles div{border:1px solid #ddd;padding:8px 10px}.tiles b{display:block;font-size:21px;font-weight:600}.tiles span{font-size:12px;color:#555}\
+.tiles div{border:1px solid #ddd;padding:8px 10px}.note{font-size:14px}.tiles b{display:block;font-size:21px;font-weight:600}.tiles span{font-size:12px;line-height:1.3;display:block;color:#555}\
 .absent{color:#555;font-style:italic;border:1px dashed #bbb;padding:8px 12px}.good{font-family:sans-serif}\
 .side>div{flex:1 1 460px;min-width:0}.dot{display:inline-block;width:10px;height:10px;border-radius:2px;margin-right:6px}\
 table.plain td{border:0;padding:2px 10px 2px 0;vertical-align:middle}svg.bar{display:block}ul.small{font:13px/1.45 sans-serif;columns:2;max-width:none}\
 svg.own{font:12px sans-serif;fill:#222}svg .grid{stroke:#ddd;fill:none}svg .axis{stroke:#999;fill:none}svg .faint{fill:#666}\
-footer{margin-top:48px;color:#666;font:13px sans-serif}\
+code{white-space:nowrap}.absent{max-width:none}footer{margin-top:48px;color:#666;font:13px sans-serif}\
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}\
 @media print{main{max-width:none;padding:0}h2{break-after:avoid}figure,table,.tiles{break-inside:avoid}.key{break-after:avoid}}\
 @media screen and (prefers-color-scheme:dark){body{background:#16181b;color:#ddd}h2{border-color:#444}th{background:#24272b}\
 th,td,.tiles div{border-color:#3a3e44}dt,td small,.note,.tiles span,.absent,footer,svg .faint{color:#a5a9b0;fill:#a5a9b0}\
 .verdict{background:#202327}svg text,svg.own{fill:#ddd}svg [stroke=\"#DDDDDD\"],svg .grid{stroke:#33373c}\
-svg [fill=\"#444444\"]{fill:#bbb}svg [stroke=\"#0072B2\"]{stroke:#3a9bdc}svg [fill=\"#0072B2\"],.dot[style*=\"#0072B2\"]{fill:#3a9bdc}}";
+svg [fill=\"#444444\"]{fill:#bbb}svg [stroke=\"#444444\"]{stroke:#bbb}svg [stroke=\"#0072B2\"]{stroke:#3a9bdc}svg [fill=\"#0072B2\"],.dot[style*=\"#0072B2\"]{fill:#3a9bdc}}";
 
 impl RunFigures {
     /// The page: one file that needs no script, font or address.

@@ -1,7 +1,7 @@
 //! Pieces that several sections of the page are made of.
 
 use super::figures::{Event, RunFigures};
-use super::plot::Axis;
+use super::plot::{Axis, Series, Shape};
 use crate::page::escaped;
 
 /// Colours that stay apart for the colour-blind (M. Okabe and K. Ito, Color Universal Design).
@@ -13,9 +13,10 @@ pub(crate) const ORANGE: &str = "#E69F00";
 pub(crate) const RED: &str = "#D55E00";
 pub(crate) const PINK: &str = "#CC79A7";
 pub(crate) const GREY: &str = "#8A8A8A";
+pub(crate) const DARK: &str = "#444444";
 
 /// Colours of processes and stages by position, the source first.
-const BY_PLACE: [&str; 8] = [GREY, SKY, BLUE, ORANGE, GREEN, PINK, YELLOW, RED];
+const BY_PLACE: [&str; 8] = [PINK, SKY, BLUE, ORANGE, GREEN, GREY, YELLOW, RED];
 
 /// The colour at a place.
 pub(crate) fn colour(place: usize) -> &'static str {
@@ -34,9 +35,9 @@ pub(crate) fn class_colour(class: &str) -> &'static str {
 }
 
 /// A whole plot's size [px].
-pub(crate) const WIDE: (u32, u32) = (1000, 290);
+pub(crate) const WIDE: (u32, u32) = (1040, 290);
 /// Half a page's.
-pub(crate) const HALF: (u32, u32) = (492, 270);
+pub(crate) const HALF: (u32, u32) = (512, 270);
 
 /// The words for colours, to stand above a plot. A dashed one is a line across or upwards.
 pub(crate) fn key(entries: &[(&str, &str)], dashed: &[(&str, &str)]) -> String {
@@ -105,7 +106,33 @@ impl Times {
 }
 
 pub(crate) fn event_colour(event: &Event) -> &'static str {
-    if event.kind == "restart" { RED } else { PINK }
+    if event.kind == "restart" { DARK } else { GREY }
+}
+
+/// What the lines upwards are, for the words above a plot.
+pub(crate) fn moment_words(events: &[Event]) -> Vec<(&'static str, &'static str)> {
+    let is_restart = |event: &Event| event.kind == "restart";
+    let restarts = events.iter().any(is_restart).then_some((DARK, "restart, numbered as under Events"));
+    let steps = events.iter().any(|event| !is_restart(event)).then_some((GREY, "step of the ladder of overload"));
+    restarts.into_iter().chain(steps).collect()
+}
+
+/// Buckets as steps: from the begin of each to its end, for the area up to `above` over that up to `below`. A gap stays one.
+pub(crate) fn steps(begins: &[f64], width: f64, above: &[f64], below: &[f64], colour: &'static str) -> Vec<Series> {
+    let rows: Vec<(f64, f64)> = begins.iter().copied().zip(0_u32..).map(|(at, place)| (at, f64::from(place))).collect();
+    let area = |piece: Vec<(f64, f64)>| {
+        let mut edges = (Vec::new(), Vec::new());
+        for (number, &(begin, place)) in piece.iter().enumerate() {
+            let end = piece.get(number + 1).map_or(begin + width, |next| next.0);
+            let value = |values: &[f64]| values.get(place as usize).copied().unwrap_or(0.0);
+            for at in [begin, end] {
+                edges.0.push((at, value(above)));
+                edges.1.push((at, value(below)));
+            }
+        }
+        Series { colour, points: edges.0, shape: Shape::Area(edges.1) }
+    };
+    pieces(rows).into_iter().map(area).collect()
 }
 
 /// Cuts a line where points are missing: where the distance is more than four times the usual one.

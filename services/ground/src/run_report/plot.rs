@@ -58,10 +58,9 @@ impl<'a> Axis<'a> {
     /// From 0 to a little over `most`, or over 1 where that is less than nothing.
     pub(crate) fn from_zero(says: &'a str, most: f64) -> Self {
         let most = if most.is_finite() && most > 0.0 { most.min(1e15) } else { 1.0 };
-        let step = step(most, 5.0);
-        let end = (most / step).ceil() * step;
-        let ticks = (0..=12).map(|tick| f64::from(tick) * step).take_while(|tick| *tick <= end * 1.001).collect();
-        Self { says, range: 0.0..end.max(1.02 * most), ticks, log: false, words: plain }
+        let (step, end) = (step(most, 5.0), 1.05 * most);
+        let ticks = (0..=12).map(|tick| f64::from(tick) * step).take_while(|tick| *tick <= end).collect();
+        Self { says, range: 0.0..end, ticks, log: false, words: plain }
     }
 
     /// Exactly from `range.start` to its end: time.
@@ -137,8 +136,8 @@ impl Ranged for Ticked {
 }
 
 /// Least distance of two moments' words [px].
-const WORDS_APART: f64 = 15.0;
-const LEFT: u32 = 58;
+const WORDS_APART: f64 = 19.0;
+const LEFT: u32 = 64;
 
 impl Plot<'_> {
     /// The picture as SVG.
@@ -150,7 +149,7 @@ impl Plot<'_> {
                 .margin(6)
                 .margin_top(if self.moments.is_empty() { 8 } else { 20 })
                 .margin_right(14)
-                .x_label_area_size(44)
+                .x_label_area_size(46)
                 .y_label_area_size(LEFT)
                 .build_cartesian_2d(
                     Ticked { range: xs.clone(), ticks: ticks(&self.x) },
@@ -162,8 +161,8 @@ impl Plot<'_> {
                 .light_line_style(TRANSPARENT)
                 .bold_line_style(PALE)
                 .axis_style(rgb("#999999"))
-                .label_style((FONT, 12))
-                .axis_desc_style((FONT, 13))
+                .label_style((FONT, 15))
+                .axis_desc_style((FONT, 15))
                 .x_label_formatter(&|place| back(&self.x, *place))
                 .y_label_formatter(&|place| back(&self.y, *place))
                 .x_desc(self.x.says)
@@ -190,7 +189,7 @@ impl Plot<'_> {
                 let (place, style) = (self.y.at(*level), rgb(colour).stroke_width(2));
                 let ends = vec![(xs.start, place), (xs.end, place)];
                 chart.draw_series([DashedPathElement::new(ends, 7, 5, style)])?;
-                let text = TextStyle::from((FONT, 12).into_font()).color(&INK).pos(Pos::new(HPos::Right, VPos::Bottom));
+                let text = TextStyle::from((FONT, 15).into_font()).color(&INK).pos(Pos::new(HPos::Right, VPos::Bottom));
                 chart.draw_series([EmptyElement::at((xs.end, place)) + Text::new(words.clone(), (-4, -3), text)])?;
             }
             let px = (f64::from(self.size.0) - f64::from(LEFT) - 20.0) / (xs.end - xs.start);
@@ -202,7 +201,7 @@ impl Plot<'_> {
                 if (place - free) * px >= WORDS_APART {
                     free = place;
                     let text =
-                        TextStyle::from((FONT, 12).into_font()).color(&INK).pos(Pos::new(HPos::Center, VPos::Bottom));
+                        TextStyle::from((FONT, 14).into_font()).color(&INK).pos(Pos::new(HPos::Center, VPos::Bottom));
                     chart.draw_series([EmptyElement::at((place, ys.end)) + Text::new(words.clone(), (0, -3), text)])?;
                 }
             }
@@ -223,6 +222,7 @@ mod tests {
             assert!(axis.range.end.is_finite() && axis.range.end > 0.0);
         }
         assert_eq!(Axis::from_zero("", 99.0).ticks, [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
+        assert_eq!(Axis::from_zero("", 200.0).range, 0.0..210.0);
         for (least, most) in [(0.0, 0.0), (2.9, 100.0), (1e-300, 1e300), (f64::NAN, f64::INFINITY), (5.0, 3.0)] {
             let axis = Axis::log("", least, most);
             assert!((1..=20).contains(&axis.ticks.len()), "{least} {most}: {:?}", axis.ticks);

@@ -1,1 +1,248 @@
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use serde_json::{Value, json};
+
+use super::{RunFigures, RunReportError};
+
+/// A report of 30 sweeps as `encke run --report` writes it.
+fn report() -> Value {
+    let bucket = |place: u64| {
+        json!({"t_s": 0.25 * place as f64, "sweeps": 3, "p50": 3.5, "p99": 5.0, "max": 6.125 + place as f64, "misses": 0,
+               "missing": 0})
+    };
+    let percentiles = json!({"count": 30, "p50": 3.515, "p99": 8.04, "p999": 9.07, "max": 9.125});
+    let hop = |stage: &str| {
+        json!({"stage": stage, "published": 30, "received": 30, "processed": 30, "rejected": {}, "dropped": {}, "lost": 0,
+               "in_flight": 0, "open": 0})
+    };
+    let spent = |stage: &str| json!({"stage": stage, "late": [], "transport": vec![0.25; 10], "queued": vec![0.0; 10], "busy": vec![2.0; 10]});
+    let worst_hop = |stage: &str, at: f64| {
+        json!({"stage": stage, "queued_ms": 0.5, "wake_ms": 0.25, "taken_ms": 0.5, "busy_ms": 1.0,
+               "started_after_due_ms": at, "finished_after_due_ms": at + 1.5})
+    };
+    let mut report = json!({
+        "encke": "0.1.0", "machine": "2 cores, some CPU", "source": "/somewhere/scene-of-the-test.toml", "sweeps": 30,
+        "sectors": 1, "pace": "realtime", "cluster_range_m": 1.0, "period_ms": 100.0, "duration_s": 3.0,
+        "ledger": {"closed": true, "hops": [hop("clusterer"), hop("recorder")], "gaps": []},
+        "latency_ms": {"end_to_end": percentiles, "end_to_end_corrected": percentiles, "stages": {}},
+        "obstacle_latency_ms": percentiles, "seam_latency_ms": {"count": 0, "p50": null},
+        "deadline": {"deadline_ms": 100.0, "misses": 0, "margin_p999_pct": 91.25, "margin_ok": true, "causes": {}}
+    });
+    let used = json!({
+        "worst_sweeps": [{"sweep": 417, "end_to_end_ms": 9.125, "cause": "clusterer compute", "step": "nominal",
+                          "hops": [worst_hop("source", -1.0), worst_hop("clusterer", 2.0)]}],
+        "steps": {"nominal": 30},
+        "processes": [{"stage": "source", "pid": 4321, "restarts": 0, "cpu_pct": 12.5, "rss_peak_kib": 20480},
+                      {"stage": "supervisor", "pid": 4320, "restarts": 0, "cpu_pct": 1.5, "rss_peak_kib": 10240}],
+        "machine_load": {"own_cpu_pct": 14.0}, "noise_ms": {"count": 300, "p50": 0.0625, "p999": 1.5, "max": 2.5},
+        "realtime_refused": [], "detections": {"rectangular": 1234, "conical": 77, "unclassified": 0}, "returns": 98765,
+        "refused": {}, "complete_sweeps": 29, "stopped": null, "verdict": {"failed": null, "failed_strict": null},
+        "latency_histogram_ms": {"end_to_end": [[1.5, 1], [3.5, 15], [8.0, 29], [9.125, 30]],
+                                 "end_to_end_corrected": [[1.5, 1], [3.5, 15], [8.0, 29], [9.125, 30]],
+                                 "obstacle": [[2.5, 100], [7.5, 200]], "seam": []}
+    });
+    let over_time = json!({
+        "timeline": {"bucket_s": 0.25, "latency_ms": (0..10).map(bucket).collect::<Vec<_>>(),
+            "spent_ms": [{"stage": "source", "late": vec![0.5; 10]}, spent("clusterer")],
+            "detections": {"rectangular": vec![123; 10], "conical": vec![7; 10]}, "sample_s": 1.0, "sample_t_s": [0.0, 1.0, 2.0],
+            "processes": {"source": {"cpu_pct": [12.0, 13.0, 12.5], "rss_kib": [20480, 20480, 20480]}},
+            "machine": {"own_cpu_pct": [14.0, null, 14.0], "foreign_cpu_pct": [90.0, 80.0, 85.0], "steal_pct": [],
+                        "wake_late_max_ms": [2.5, 0.5, 0.5]},
+            "events": [], "event_count": 0}
+    });
+    for more in [used, over_time] {
+        report.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    }
+    report
+}
+
+fn page(report: &Value) -> String {
+    RunFigures::from_json(report.to_string().as_bytes()).unwrap().to_html()
+}
+
+fn expect(page: &str, words: &[&str]) {
+    for words in words {
+        assert!(page.contains(words), "{words:?} is not in the page");
+    }
+    assert_whole(page);
+}
+
+/// One document that loads nothing, and in which every element that was opened is closed.
+fn assert_whole(page: &str) {
+    for foreign in ["http://", "https://", "<script", "@import", "url(", " src=", "NaN", "inf"] {
+        let found = page.find(foreign).filter(|&at| !page[at..].starts_with("info"));
+        assert!(found.is_none(), "{foreign:?} in {:?}", found.map(|at| &page[at.saturating_sub(60)..at + 20]));
+    }
+    for element in ["svg", "table", "tr", "td", "figure", "div", "p", "h2", "g", "text", "ul", "span"] {
+        let opened = page.matches(&format!("<{element}>")).count() + page.matches(&format!("<{element} ")).count();
+        assert_eq!(opened, page.matches(&format!("</{element}>")).count(), "<{element}>");
+    }
+}
+
+#[test]
+fn the_page_shows_what_the_report_says() {
+    let page = page(&report());
+    expect(
+        &page,
+        &[
+            "<h1>Run of scene-of-the-test.toml</h1>",
+            "2 cores, some CPU",
+            "98\u{202f}765 returns",
+            "The ledger is closed",
+            "No sweep missed the deadline of 100 ms. At p99.9, 91 % of it are left",
+            "✓ None: all 30 sweeps were answered within 100 ms",
+            "Exit code 0, with <code>--strict</code> as well.",
+            "<td class=\"n\">8.04</td>",
+            "417</tspan> · 9.12 ms",
+            "clusterer compute",
+            "<td class=\"n\">4321</td>",
+            "1\u{202f}234",
+            "all 2 cores",
+            "woke 0.062 ms late at the median",
+            "answered after 2.75 ms on average",
+            "No stage was restarted",
+        ],
+    );
+    assert!(!page.contains("class=\"absent\""), "nothing is missing");
+}
+
+#[test]
+fn misses_restarts_and_an_open_ledger_are_told() {
+    let mut report = report();
+    report["ledger"]["closed"] = json!(false);
+    report["ledger"]["hops"][0]["dropped"] = json!({"overflow": 4});
+    report["ledger"]["gaps"] =
+        json!([{"stage": "clusterer", "kind": "dropped", "first_sweep": 11, "last_sweep": 14, "parts": 4}]);
+    report["deadline"] = json!({"deadline_ms": 100.0, "misses": 5, "margin_p999_pct": -20.0, "margin_ok": false,
+                                "causes": {"clusterer dropped": 4, "source late": 1}});
+    report["verdict"] = json!({"failed": "the ledger is OPEN", "failed_strict": "the ledger is OPEN"});
+    report["timeline"]["events"] = json!([{"t_s": 1.5, "kind": "restart", "what": "clusterer (signal 9)"}]);
+    report["timeline"]["event_count"] = json!(3);
+    expect(
+        &page(&report),
+        &[
+            "verdict bad",
+            "<b>The ledger is OPEN</b>",
+            "4 parts were dropped or lost",
+            "5 of 30 sweeps missed the deadline of 100 ms, 4 of them by <b>clusterer dropped</b>",
+            "At p99.9 it is exceeded by 20 %",
+            "failed with exit code 1: the ledger is OPEN.",
+            "80.0 %",
+            "clusterer dropped: sweeps 11 to 14, 4 parts",
+            "4 overflow",
+            "restart: clusterer (signal 9)",
+            "And 2 more.",
+            "restart, numbered as under Events",
+        ],
+    );
+}
+
+#[test]
+fn a_run_as_fast_as_it_goes_has_no_deadlines() {
+    let mut report = report();
+    report["pace"] = json!("fast");
+    let page = page(&report);
+    expect(&page, &["without deadlines", "there are no deadlines to miss", "as fast as it goes"]);
+    assert!(!page.contains("deadline 100 ms"), "no line is drawn");
+}
+
+#[test]
+fn what_an_older_report_lacks_is_named_and_the_rest_is_shown() {
+    let whole = report();
+    for name in whole.as_object().unwrap().keys() {
+        let mut report = whole.clone();
+        report.as_object_mut().unwrap().remove(name);
+        assert_whole(&page(&report));
+    }
+    let mut older = whole;
+    for name in ["timeline", "latency_histogram_ms", "verdict", "worst_sweeps"] {
+        older.as_object_mut().unwrap().remove(name);
+    }
+    expect(
+        &page(&older),
+        &[
+            "it has percentiles and no distributions to draw",
+            "it has no timeline.",
+            "does not say how the command ended",
+            "does not name its slowest sweeps",
+            "<td class=\"n\">8.04</td>",
+        ],
+    );
+    assert_whole(&page(&json!({"ledger": {}})));
+}
+
+#[test]
+fn hostile_words_and_numbers_stay_words_and_numbers() {
+    let hostile = "</title><script>alert('&')</script>\" onload=\"x";
+    let mut report = report();
+    fn spoil(value: &mut Value, hostile: &str) {
+        match value {
+            Value::String(text) => *text = hostile.to_owned(),
+            Value::Array(values) => values.iter_mut().for_each(|value| spoil(value, hostile)),
+            Value::Object(object) => {
+                object.values_mut().for_each(|value| spoil(value, hostile));
+            }
+            _ => {}
+        }
+    }
+    spoil(&mut report, hostile);
+    for name in
+        ["/deadline/causes", "/detections", "/timeline/detections", "/steps", "/refused", "/ledger/hops/0/rejected"]
+    {
+        let value = if name == "/timeline/detections" { json!(vec![5; 10]) } else { json!(5) };
+        *report.pointer_mut(name).unwrap() = json!({ hostile: value });
+    }
+    report["timeline"]["processes"] = json!({hostile: {"cpu_pct": [1.0, 2.0, 3.0], "rss_kib": [1, 2, 3]}});
+    report["deadline"]["misses"] = json!(5);
+    report["timeline"]["events"] = json!([{"t_s": 1.0, "kind": hostile, "what": hostile}]);
+    let found = page(&report);
+    assert!(!found.contains("<script") && !found.contains("onload=\"x"));
+    assert_whole(&found);
+    for extreme in [json!(-1e300), json!(1e300), json!(0.0), json!(1e-300)] {
+        let mut report = self::report();
+        fn stretch(value: &mut Value, extreme: &Value) {
+            match value {
+                Value::Number(number) if number.is_f64() => *value = extreme.clone(),
+                Value::Array(values) => values.iter_mut().for_each(|value| stretch(value, extreme)),
+                Value::Object(object) => object.values_mut().for_each(|value| stretch(value, extreme)),
+                _ => {}
+            }
+        }
+        stretch(&mut report, &extreme);
+        let page = page(&report);
+        assert!(page.len() < 2_000_000 && page.ends_with("</html>\n"), "{extreme}");
+    }
+}
+
+#[test]
+fn what_is_no_report_is_refused_in_one_line_that_says_what_it_is() {
+    let whole = report().to_string();
+    let error = |bytes: &[u8]| RunFigures::from_json(bytes).unwrap_err().to_string();
+    let cases: [(&[u8], &str); 9] = [
+        (b"", "is empty"),
+        (b" \n", "is empty"),
+        (&whole.as_bytes()[..whole.len() / 2], "is torn JSON: EOF while parsing"),
+        (b"{\"sweep\":0,\"detections\":[]}\n{\"sweep\":1,\"detections\":[]}\n", "a file of detections"),
+        (b"[{\"name\":\"process_name\",\"ph\":\"M\"}]", "is a trace"),
+        (b"\xd4\xc3\xb2\xa1\x02\x00", "is a capture (pcap)"),
+        (b"x,y,z\n1,2,3\n", "is some other text"),
+        (b"\xff\xfe\x00", "is no text"),
+        (b"{\"a\":1}", "is other JSON"),
+    ];
+    for (bytes, words) in cases {
+        let error = error(bytes);
+        assert!(error.contains(words) && !error.contains('\n'), "{error:?} instead of {words:?}");
+    }
+    let torn = RunFigures::from_json(&whole.as_bytes()[..100]).unwrap_err();
+    assert!(matches!(torn, RunReportError::Torn { at: 100, length: 100, .. }), "{torn}");
+    let odd = whole.replace("\"sweeps\":30", "\"sweeps\":\"many\"");
+    assert!(error(odd.as_bytes()).contains("invalid type: string \"many\", expected u64"));
+}
+
+#[test]
+fn a_report_cut_anywhere_is_refused_and_never_a_panic() {
+    let whole = report().to_string();
+    for length in (0..whole.len()).step_by(7) {
+        assert!(RunFigures::from_json(&whole.as_bytes()[..length]).is_err(), "{length}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Processes and machine over time.
 
 use super::figures::{Process, ProcessTimeline, RunFigures, Timeline};
-use super::parts::{BLUE, GREY, HALF, ORANGE, RED, Times, WIDE, absent, colour, key, maybe_ms, pieces};
+use super::parts::{BLUE, GREY, HALF, ORANGE, RED, Times, WIDE, absent, colour, key, maybe_ms, pieces, steps};
 use super::plot::{Axis, Plot, Series, Shape, plain};
 use crate::page::figure;
 
@@ -44,15 +44,15 @@ fn cores(figures: &RunFigures) -> Option<f64> {
 
 fn cpu(figures: &RunFigures, timeline: &Timeline, named: &[(&str, &'static str, &ProcessTimeline)]) -> String {
     let times = Times::of(figures);
-    let x: Vec<f64> = timeline.sample_t_s.iter().map(|t_s| times.at(t_s + timeline.sample_s / 2.0)).collect();
-    let along = |ys: &[f64]| x.iter().copied().zip(ys.iter().copied()).collect::<Vec<_>>();
-    let mut below = vec![0.0; x.len()];
+    let begins: Vec<f64> = timeline.sample_t_s.iter().map(|t_s| times.at(*t_s)).collect();
+    let width = times.at(timeline.sample_s);
+    let mut below = vec![0.0; begins.len()];
     let mut series = Vec::new();
     for (_, colour, process) in named {
         let above: Vec<f64> = (below.iter().enumerate())
             .map(|(place, below)| below + process.cpu_pct.get(place).copied().unwrap_or(0.0).max(0.0))
             .collect();
-        series.push(Series { colour, shape: Shape::Area(along(&below)), points: along(&above) });
+        series.extend(steps(&begins, width, &above, &below, colour));
         below = above;
     }
     let cores = cores(figures);
@@ -61,7 +61,7 @@ fn cpu(figures: &RunFigures, timeline: &Timeline, named: &[(&str, &'static str, 
     let plot = Plot {
         size: WIDE,
         x: times.axis(),
-        y: Axis::from_zero("CPU [% of a core]", most * 1.02),
+        y: Axis::from_zero("CPU [% of a core]", most),
         series,
         levels: cores.map(|cores| (words(cores), GREY, 100.0 * cores)).into_iter().collect(),
         moments: times.moments(&timeline.events),
@@ -88,7 +88,7 @@ fn memory(figures: &RunFigures, timeline: &Timeline, named: &[(&str, &'static st
         y: Axis::from_zero("resident memory [MiB]", most),
         series,
         levels: Vec::new(),
-        moments: times.moments(&timeline.events),
+        moments: Vec::new(),
     };
     let entries: Vec<_> = named.iter().map(|(name, colour, _)| (*colour, *name)).collect();
     format!("<div>{}{}</div>", key(&entries, &[]), figure(&plot.svg(), "Memory of each process."))

@@ -87,7 +87,9 @@ fn row(sweep: &WorstSweep, top: f64, x: &impl Fn(f64) -> f64) -> String {
     for (place, hop) in sweep.hops.iter().enumerate() {
         let WorstHop { queued_ms, taken_ms, started_after_due_ms: started, finished_after_due_ms: finished, .. } = hop;
         let colour = colour(place);
-        if place > 0 {
+        if place == 0 {
+            block(0.0, *started, colour, 1.0, 4.0, 18.0);
+        } else {
             block(sent, (sent + queued_ms).min(*started), GREY, 0.45, 8.0, 12.0);
             block(sent + queued_ms, *started, colour, 0.35, 8.0, 12.0);
         }
