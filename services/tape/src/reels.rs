@@ -80,7 +80,10 @@ impl Reels {
         if kind.as_ref().is_ok_and(|kind| kind.is_fifo() || kind.is_socket()) {
             return Err(TapeError::NoFile(path.to_owned()));
         }
-        let regular = kind.as_ref().map_or(true, |kind| kind.is_file() || kind.is_dir());
+        if kind.as_ref().is_ok_and(std::fs::FileType::is_dir) {
+            return Err(create(io::ErrorKind::IsADirectory.into()));
+        }
+        let regular = kind.map_or(true, |kind| kind.is_file());
         let mut reels = Self {
             settings,
             path: path.to_owned(),
@@ -111,11 +114,15 @@ impl Reels {
 
     /// Finds the files of earlier lives to go on after, or clears an earlier run's out of the way.
     fn look(&mut self, resume: bool) -> io::Result<Result<(), TapeError>> {
-        for number in present(&self.path)? {
-            let path = numbered(&self.path, number);
-            if number > 0 && !is_ours(&path)? {
-                return Ok(Err(TapeError::Foreign { path: self.path.clone(), other: path }));
+        let numbers = present(&self.path)?;
+        for &number in &numbers {
+            let other = numbered(&self.path, number);
+            if number > 0 && !is_ours(&other)? {
+                return Ok(Err(TapeError::Foreign { path: self.path.clone(), other }));
             }
+        }
+        for number in numbers {
+            let path = numbered(&self.path, number);
             if resume {
                 let bytes = path.metadata()?.len();
                 self.kept.push_back(Kept { path, bytes, messages: Tally::default() });
@@ -301,6 +308,33 @@ mod tests {
     use crate::sink::tests::SmallDisk;
 
     const S: u64 = 1_000_000_000;
+
+    /// Counts what is told as an error, and as anything else.
+    #[derive(Clone, Default)]
+    struct Told {
+        errors: Arc<AtomicUsize>,
+        others: Arc<AtomicUsize>,
+    }
+
+    impl tracing::Subscriber for Told {
+        fn enabled(&self, _: &tracing::Metadata<'_>) -> bool {
+            true
+        }
+
+        fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
+            tracing::span::Id::from_u64(1)
+        }
+
+        fn event(&self, event: &tracing::Event<'_>) {
+            let error = *event.metadata().level() == tracing::Level::ERROR;
+            if error { &self.errors } else { &self.others }.fetch_add(1, Ordering::Relaxed);
+        }
+
+        fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
+        fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
+        fn enter(&self, _: &tracing::span::Id) {}
+        fn exit(&self, _: &tracing::span::Id) {}
+    }
     const MESSAGE: [u8; 1000] = [7; 1000];
 
     /// Files in memory, each on a disk with the room that there is when it is opened.
@@ -409,5 +443,24 @@ mod tests {
         let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 0.0).unwrap();
         write(&mut sut, S);
         assert_eq!((told(&sut), sut.failure.is_some()), ((0, 1), true));
+    }
+
+    #[test]
+    fn a_disk_that_stays_full_is_told_once_and_so_is_that_recording_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let shelf = Shelf::default();
+        shelf.room.store(14_000, Ordering::Relaxed);
+        let told = Told::default();
+        tracing::subscriber::with_default(told.clone(), || {
+            let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 1.0).unwrap();
+            (0..10).for_each(|_| write(&mut sut, 0));
+            shelf.room.store(300, Ordering::Relaxed);
+            (1..100).for_each(|second| write(&mut sut, second * S));
+            assert_eq!((told.errors.load(Ordering::Relaxed), told.others.load(Ordering::Relaxed)), (1, 0));
+            shelf.room.store(1 << 20, Ordering::Relaxed);
+            (100..110).for_each(|second| write(&mut sut, second * S));
+            assert_eq!((told.errors.load(Ordering::Relaxed), told.others.load(Ordering::Relaxed)), (1, 1));
+            assert_eq!(sut.number, 1);
+        });
     }
 }

@@ -121,11 +121,12 @@ impl Tape {
         })
     }
 
-    /// Takes a part of a sweep, as the source sends it. The sweep is written with its last part.
+    /// Takes a part of a sweep, as the source sends it. The sweep is written with its last part; one that lacks a part
+    /// is given up with the first part of a later one. It may be sent again from its first part until it is written.
     pub fn sweep(&mut self, utc_ns: u64, trace: &Trace, piece: &Sweep) {
         let part = &trace.part;
         self.hear(piece.header.sensor_time_ns);
-        if !self.sweeps.takes(part.sweep) {
+        if !self.sweeps.takes(part.sweep, part.sector) {
             return;
         }
         let Some(whole) = self.joiner.add(part, piece) else { return };
@@ -166,7 +167,7 @@ impl Tape {
     pub fn detections(&mut self, utc_ns: u64, trace: &Trace, piece: &Detections) {
         let part = &trace.part;
         self.hear(piece.header.sensor_time_ns);
-        if !self.detections.takes(part.sweep) {
+        if !self.detections.takes(part.sweep, part.sector) {
             return;
         }
         let Some(whole) = self.detections_joiner.add(part, piece) else { return };
@@ -205,7 +206,7 @@ impl Tape {
     pub fn truth(&mut self, utc_ns: u64, trace: &Trace, truth: &Truth) {
         let sweep = trace.part.sweep;
         self.hear(truth.sensor_time_ns);
-        if !self.reels.settings().has(Topic::Truth) || !self.truths.takes(sweep) {
+        if !self.reels.settings().has(Topic::Truth) || !self.truths.takes(sweep, 0) {
             return;
         }
         self.truths.end(sweep);
@@ -218,7 +219,7 @@ impl Tape {
     /// Takes a part of the clusters, as the clusterer sends it; written as it comes.
     pub fn clusters(&mut self, utc_ns: u64, trace: &Trace, piece: &Clusters) {
         self.hear(piece.header.sensor_time_ns);
-        if self.reels.settings().has(Topic::RawClusters) && self.raw_clusters.takes(trace.part.ordinal) {
+        if self.reels.settings().has(Topic::RawClusters) && self.raw_clusters.takes(trace.part.ordinal, 0) {
             self.raw_clusters.end(trace.part.ordinal);
             self.raw_part(Topic::RawClusters, utc_ns, trace, piece.header.sensor_time_ns, piece);
         }
@@ -227,7 +228,7 @@ impl Tape {
     /// Takes a part of the descriptors, as the extractor sends it; written as it comes.
     pub fn descriptors(&mut self, utc_ns: u64, trace: &Trace, piece: &Descriptors) {
         self.hear(piece.header.sensor_time_ns);
-        if self.reels.settings().has(Topic::RawDescriptors) && self.raw_descriptors.takes(trace.part.ordinal) {
+        if self.reels.settings().has(Topic::RawDescriptors) && self.raw_descriptors.takes(trace.part.ordinal, 0) {
             self.raw_descriptors.end(trace.part.ordinal);
             self.raw_part(Topic::RawDescriptors, utc_ns, trace, piece.header.sensor_time_ns, piece);
         }

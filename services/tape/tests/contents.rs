@@ -135,8 +135,8 @@ fn every_channel_says_how_to_read_it() {
     let bytes = std::fs::read(&path).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.channels.len(), Topic::ALL.len());
-    for channel in summary.channels.values() {
-        let topic = Topic::ALL.into_iter().find(|topic| topic.name() == channel.topic).unwrap();
+    for topic in Topic::ALL {
+        let channel = summary.channels.values().find(|channel| channel.topic == topic.name()).unwrap();
         let schema = channel.schema.as_ref().unwrap();
         assert_eq!(
             (schema.name.as_str(), channel.message_encoding.as_str()),

@@ -143,6 +143,19 @@ fn a_sweep_that_is_sent_again_from_its_first_sector_is_written_once() {
 }
 
 #[test]
+fn a_successor_takes_sweeps_that_are_sent_again_though_the_rest_of_later_ones_came_before() {
+    let (outcome, counts) = outcome(8, |tape| {
+        sweep(tape, &made(2), &[1, 2]);
+        detections(tape, &made(1), &[2]);
+        (0..3).for_each(|number| sweep(tape, &made(number), &ALL));
+        (0..3).for_each(|number| detections(tape, &made(number), &ALL));
+    });
+    let all = || (vec![0, 1, 2], 0);
+    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all() });
+    assert_eq!(counts.doubles, 0);
+}
+
+#[test]
 fn detections_whose_members_are_no_returns_of_the_sweep_cost_the_clusters_alone() {
     let (outcome, _) = outcome(8, |tape| {
         let mut odd = made(0);
