@@ -13,6 +13,10 @@ use crate::reel::{About, Closed, Reel, Stamps};
 use crate::settings::{Settings, TapeError, WhenFull};
 use crate::sink::Target;
 
+/// How often the time between two attempts doubles. A disk that is full is a little less so once a torn chunk is cut
+/// off: without patience it would be filled with small files.
+const MOST_DOUBLINGS: u32 = 8;
+
 /// Creates a file of the run, or empties it.
 pub(crate) type Open = Box<dyn Fn(&Path) -> io::Result<Box<dyn Target>> + Send>;
 
@@ -51,6 +55,8 @@ pub(crate) struct Reels {
     empty: bool,
     /// Whether nothing was written since the latest error.
     failing: bool,
+    /// Attempts in a row of which no file was completed.
+    attempts: u32,
     /// Files that the quota counts, the oldest first; not the one being written.
     kept: VecDeque<Kept>,
     /// Whether there can be more than one file: not where the path is a device.
@@ -93,6 +99,7 @@ impl Reels {
             number: 0,
             empty: true,
             failing: false,
+            attempts: 0,
             kept: VecDeque::new(),
             regular,
             files: 0,
@@ -182,7 +189,10 @@ impl Reels {
         let State::Writing(reel, _) = std::mem::replace(&mut self.state, State::Failed(None)) else { return true };
         let (closed, result) = reel.finish();
         match result {
-            Ok(()) => self.keep(closed),
+            Ok(()) => {
+                self.keep(closed);
+                self.attempts = 0;
+            }
             Err(error) => {
                 self.fail(closed, &error, utc_ns);
                 return false;
@@ -228,7 +238,9 @@ impl Reels {
         }
         self.failure = Some(format!("{}: {error}", path.display()));
         let again = self.settings.retry_ns.filter(|_| self.regular);
-        self.state = State::Failed(again.map(|span_ns| utc_ns.saturating_add(span_ns)));
+        let span_ns = |first_ns: u64| first_ns.saturating_mul(1 << self.attempts.min(MOST_DOUBLINGS));
+        self.state = State::Failed(again.map(|first_ns| utc_ns.saturating_add(span_ns(first_ns))));
+        self.attempts += 1;
     }
 
     fn keep(&mut self, closed: Closed) {
@@ -424,12 +436,14 @@ mod tests {
         shelf.room.store(500, Ordering::Relaxed);
         write(&mut sut, 11 * S);
         shelf.room.store(0, Ordering::Relaxed);
-        write(&mut sut, 21 * S);
-        shelf.room.store(14_000, Ordering::Relaxed);
+        write(&mut sut, 30 * S);
+        assert_eq!(shelf.read().len(), 2, "twice as long");
         write(&mut sut, 31 * S);
-        write(&mut sut, 32 * S);
-        sut.finish(33 * S);
-        assert_eq!(told(&sut), (first + 2, lost + 3));
+        shelf.room.store(14_000, Ordering::Relaxed);
+        write(&mut sut, 71 * S);
+        write(&mut sut, 72 * S);
+        sut.finish(73 * S);
+        assert_eq!(told(&sut), (first + 2, lost + 4));
         let names = |name: &str, messages: u64| (name.to_owned(), messages as usize);
         assert_eq!(shelf.read(), [names("run.mcap", first), names("run_0001.mcap", 0), names("run_0001.mcap", 2)]);
     }
@@ -455,10 +469,10 @@ mod tests {
             let mut sut = start(&shelf, folder.path(), |file| file.retry_s = 1.0).unwrap();
             (0..10).for_each(|_| write(&mut sut, 0));
             shelf.room.store(300, Ordering::Relaxed);
-            (1..100).for_each(|second| write(&mut sut, second * S));
+            (1..1000).for_each(|second| write(&mut sut, second * S));
             assert_eq!((told.errors.load(Ordering::Relaxed), told.others.load(Ordering::Relaxed)), (1, 0));
             shelf.room.store(1 << 20, Ordering::Relaxed);
-            (100..110).for_each(|second| write(&mut sut, second * S));
+            (1000..1300).for_each(|second| write(&mut sut, second * S));
             assert_eq!((told.errors.load(Ordering::Relaxed), told.others.load(Ordering::Relaxed)), (1, 1));
             assert_eq!(sut.number, 1);
         });

@@ -54,7 +54,7 @@ pub struct TapeFile {
     pub quota_mib: u64,
     /// What happens at the quota.
     pub when_full: WhenFull,
-    /// Time after a write error at which a new file is tried [s]; 0 = never.
+    /// Time after a write error at which a new file is tried [s], twice as long after each further one; 0 = never.
     pub retry_s: f64,
     /// Sweeps that wait for their detections, and detections for their sweep, 1 to [`MAX_HOLD_SWEEPS`].
     pub hold_sweeps: usize,
