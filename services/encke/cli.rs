@@ -54,9 +54,12 @@ pub(crate) enum Command {
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
     Doctor(DoctorArgs),
-    /// Make one HTML page, with plots, of a run's report or recording.
-    #[command(after_help = REPORT_NOTES)]
-    Report(ReportArgs),
+    /// Show a running chain in the terminal.
+    #[command(after_help = TOP_NOTES)]
+    Top(TopArgs),
+    /// Serve a running chain to Foxglove, over a WebSocket.
+    #[command(after_help = LIVE_NOTES)]
+    Live(LiveArgs),
 }
 
 const RUN_EXAMPLES: &str = "Examples:
@@ -137,6 +140,15 @@ Examples:
   encke run --report r.json && encke report r.json            writes r.html
   encke report flight.mcap --out flight.html
   encke report flight.mcap --json";
+
+const LIVE_NOTES: &str = "\
+Topics: /encke/sweep, /encke/clusters, /encke/detections, /encke/events, /encke/status. It runs behind everything else on
+the machine; what a slow viewer cannot take is not sent, and counted. Standard output has the address, and at the end where
+the messages went.
+
+Examples:
+  encke live                                   then open ws://127.0.0.1:8765 in Foxglove
+  encke live --instance flight-1 --port 9000 --wait";
 
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
@@ -447,6 +459,26 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "FILE.html", conflicts_with = "json")]
     pub(crate) out: Option<PathBuf>,
     /// Print the figures as JSON instead: those of a recording are worked out from it.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Options of `encke live`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct LiveArgs {
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+    /// Address to listen on; whoever reaches another than this machine's own sees the chain.
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1")]
+    pub(crate) bind: String,
+    /// Port to listen on; 0 is any that is free.
+    #[arg(long, default_value_t = 8765)]
+    pub(crate) port: u16,
+    /// When the chain ends, wait for its next start.
+    #[arg(long)]
+    pub(crate) wait: bool,
+    /// Print where the messages went as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -12,6 +12,7 @@ mod doctor;
 mod evaluate;
 mod inject;
 mod instances;
+mod live;
 mod outputs;
 mod report;
 mod run;
@@ -81,7 +82,8 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
-        Command::Report(args) => report::report(&args),
+        Command::Top(args) => top::top(&args),
+        Command::Live(args) => live::live(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

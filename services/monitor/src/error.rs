@@ -8,6 +8,17 @@ pub enum MonitorError {
     /// Shared memory failed, or all places for viewers are taken.
     #[error(transparent)]
     Transport(#[from] transport::TransportError),
+    /// The address cannot be listened on.
+    #[error("{address}: {cause}; choose another with --port or --bind")]
+    Listen {
+        /// Address and port as asked for.
+        address: String,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// There is no memory to join sweeps in.
+    #[error("no memory for a sweep; free some")]
+    Memory,
     /// The terminal failed.
     #[error("terminal: {0}")]
     Terminal(std::io::Error),

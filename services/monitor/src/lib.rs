@@ -6,7 +6,10 @@
 
 mod attached;
 mod error;
+mod events;
+pub mod live;
 mod process;
+mod sample;
 pub mod top;
 
 pub use error::MonitorError;

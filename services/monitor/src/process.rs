@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use preempt_rt::sched::{Pid, Scheduler, SchedulerParams, set_scheduler};
 use rustix::param::{clock_ticks_per_second, page_size};
 use rustix::process::setpriority_process;
 
@@ -45,6 +46,12 @@ fn parse(stat: &str, ticks_per_s: f64, page_bytes: u64) -> Option<Usage> {
 /// Puts this process behind all others. One that may not be nicer already is.
 pub(crate) fn be_nice() {
     let _ = setpriority_process(None, NICEST);
+}
+
+/// Lets this thread run only when no other wants the core. The kernel grants that to everybody.
+pub(crate) fn be_idle() {
+    be_nice();
+    let _ = set_scheduler(Pid::current_thread(), Scheduler::SCHED_IDLE, SchedulerParams { priority: 0 });
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 mod draw;
 mod model;
-mod sample;
 mod terminal;
 mod text;
 mod ui;

@@ -3,10 +3,10 @@ use runtime::clock;
 use transport::{Instance, Tap};
 
 use super::model::Model;
-use super::sample::Sample;
 use super::view::View;
 use crate::MonitorError;
 use crate::attached::Attached;
+use crate::sample::Sample;
 
 /// Between two looks at the tap [ns]: a tenth of its queue at 10 Hz.
 const TAP_NS: u64 = 40_000_000;

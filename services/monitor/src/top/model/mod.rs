@@ -1,7 +1,6 @@
 //! Samples and parts in, a [`View`] out. Reads no clock and no file: the same input gives the same view.
 
 mod detections;
-mod events;
 mod sweeps;
 #[cfg(test)]
 mod tests;
@@ -11,12 +10,12 @@ use std::collections::VecDeque;
 use messages::{Detections, Step, Trace};
 use runtime::page::{Counts, State};
 
-use super::sample::{Sample, StageSample};
 use super::view::{ProcessView, StageView, TapView, View};
 use crate::attached::Facts;
+use crate::events::Events;
 use crate::process::Usage;
+use crate::sample::{Sample, StageSample};
 use detections::Collector;
-use events::Events;
 use sweeps::Sweeps;
 
 /// Rates are taken over this time [ns]: the kernel counts CPU time in ticks of 10 ms.
@@ -79,7 +78,9 @@ impl Model {
         if let Some(before) = self.marks.back() {
             self.events.compare(&self.facts, now, &before.sample, &sample);
         }
-        self.events.add_misses(now, &self.facts, self.sweeps.take_misses());
+        for (sweep, latency_ns) in self.sweeps.take_misses() {
+            self.events.add_miss((now.0, sweep), &self.facts, latency_ns);
+        }
         let busy_ns = self.sweeps.busy_ns().to_vec();
         let parts = self.sweeps.tap().parts;
         let from_ns = sample.at_ns.saturating_sub(RATE_NS);

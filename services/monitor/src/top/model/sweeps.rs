@@ -14,10 +14,10 @@ const HISTORY: usize = 240;
 
 /// What became of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ended {
-    pub(super) sweep: u64,
+struct Ended {
+    sweep: u64,
     /// From its last return to its last detection sent; none where it was not answered.
-    pub(super) latency_ns: Option<u64>,
+    latency_ns: Option<u64>,
     /// Work of each stage; none where not every part was seen.
     busy_ns: Option<[u64; MAX_HOPS]>,
 }
@@ -150,9 +150,9 @@ impl Sweeps {
         self.recent.iter().skip(self.recent.len().saturating_sub(WINDOW))
     }
 
-    /// Misses since the last call.
-    pub(super) fn take_misses(&mut self) -> Vec<Ended> {
-        std::mem::take(&mut self.untold)
+    /// Misses since the last call: the sweep, and how long it took where it was answered.
+    pub(super) fn take_misses(&mut self) -> impl Iterator<Item = (u64, Option<u64>)> + use<> {
+        std::mem::take(&mut self.untold).into_iter().map(|ended| (ended.sweep, ended.latency_ns))
     }
 
     /// Work of each stage on all parts seen so far.

@@ -5,10 +5,9 @@ use std::collections::VecDeque;
 use messages::{Step, Verdict};
 use runtime::page::State;
 
-use super::sweeps::Ended;
 use crate::attached::Facts;
-use crate::top::sample::{Sample, StageSample};
-use crate::top::view::EventView;
+use crate::sample::{Sample, StageSample};
+use crate::top::EventView;
 
 /// Events that are remembered.
 const MOST: usize = 200;
@@ -39,12 +38,12 @@ struct Event {
 
 /// The latest events.
 #[derive(Default)]
-pub(super) struct Events {
+pub(crate) struct Events {
     events: VecDeque<Event>,
 }
 
 /// Uptime [s] and sweep of a look.
-type Moment = (f64, u64);
+pub(crate) type Moment = (f64, u64);
 
 impl Events {
     fn add(&mut self, (at_s, sweep): Moment, stage: &str, kind: Kind, count: u64, text: String) {
@@ -67,12 +66,12 @@ impl Events {
     }
 
     /// The instance runs again.
-    pub(super) fn add_renewal(&mut self) {
+    pub(crate) fn add_renewal(&mut self) {
         self.once((0.0, 0), "chain", "the instance was started anew".to_owned());
     }
 
     /// Adds what changed from one look to the next.
-    pub(super) fn compare(&mut self, facts: &Facts, now: Moment, before: &Sample, after: &Sample) {
+    pub(crate) fn compare(&mut self, facts: &Facts, now: Moment, before: &Sample, after: &Sample) {
         for (name, (before, after)) in facts.stages.iter().zip(before.stages.iter().zip(&after.stages)) {
             self.compare_stage(now, name, before, after);
         }
@@ -108,19 +107,17 @@ impl Events {
         }
     }
 
-    /// Adds sweeps that were late or not answered.
-    pub(super) fn add_misses(&mut self, now: Moment, facts: &Facts, missed: Vec<Ended>) {
-        for Ended { sweep, latency_ns, .. } in missed {
-            let text = match latency_ns {
-                Some(ns) => format!("{:.1} ms of {:.0}", ns as f64 / 1e6, facts.deadline_ms),
-                None => "not answered".to_owned(),
-            };
-            self.add((now.0, sweep), "chain", Kind::Miss, 1, text);
-        }
+    /// Adds a sweep that was late or not answered.
+    pub(crate) fn add_miss(&mut self, at: Moment, facts: &Facts, latency_ns: Option<u64>) {
+        let text = match latency_ns {
+            Some(ns) => format!("{:.1} ms of {:.0}", ns as f64 / 1e6, facts.deadline_ms),
+            None => "not answered".to_owned(),
+        };
+        self.add(at, "chain", Kind::Miss, 1, text);
     }
 
     /// For people, oldest first.
-    pub(super) fn views(&self) -> Vec<EventView> {
+    pub(crate) fn views(&self) -> Vec<EventView> {
         self.events.iter().map(Event::view).collect()
     }
 }
