@@ -6,6 +6,7 @@ class Plots {
   constructor(store, classes, jump) {
     Object.assign(this, { store, classes });
     this.shown = new Set([1, 2, 3, 4]);
+    this.sheets = new Map();
     this.latency = document.getElementById("latency");
     this.stack = document.getElementById("classes");
     for (const canvas of [this.latency, this.stack]) {
@@ -27,15 +28,38 @@ class Plots {
     return Math.min(Math.max(Math.floor(share * this.sweeps), 0), this.sweeps - 1);
   }
 
-  // A fresh sheet: pen, inner width and height, and where a value of `top` at most stands.
-  sheet(canvas, top, label) {
+  // Puts a canvas's plot on it, painted anew only where its size or `key` changed: recordings are long, cursors move often.
+  show(canvas, key, paint) {
     const scale = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
-    canvas.width = Math.round(width * scale);
-    canvas.height = Math.round(height * scale);
+    const wanted = `${width} ${height} ${scale} ${key}`;
+    let sheet = this.sheets.get(canvas);
+    if (sheet?.key !== wanted) {
+      const paper = document.createElement("canvas");
+      paper.width = canvas.width = Math.max(1, Math.round(width * scale));
+      paper.height = canvas.height = Math.max(1, Math.round(height * scale));
+      const pen = paper.getContext("2d");
+      pen.scale(scale, scale);
+      sheet = { key: wanted, paper };
+      this.sheets.set(canvas, sheet);
+      paint(pen, width, height);
+    }
     const pen = canvas.getContext("2d");
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.drawImage(sheet.paper, 0, 0);
     pen.scale(scale, scale);
+    for (const [place, colour] of [[this.at, "#f0c674"], [this.over, "#ffffff60"]]) {
+      if (place === null || place === undefined) continue;
+      pen.fillStyle = colour;
+      pen.fillRect(this.x(place, width) - 0.75, TOP, 1.5, height - TOP - LOW);
+    }
+  }
+
+  x(place, width) { return LEFT + (place + 0.5) * (width - LEFT - RIGHT) / this.sweeps; }
+
+  // Axes; gives where a value stands that is `top` at most.
+  axes(pen, width, height, top, label) {
     pen.font = "10px system-ui, sans-serif";
-    const x = (place) => LEFT + (place + 0.5) * (width - LEFT - RIGHT) / this.sweeps;
     const y = (value) => height - LOW - value / top * (height - LOW - TOP);
     pen.fillStyle = "#93a0ae";
     pen.strokeStyle = "#27303b";
@@ -52,15 +76,7 @@ class Plots {
     pen.fillText("0 s", LEFT, height - 3);
     pen.textAlign = "right";
     pen.fillText(`${(time[last] / 1000).toFixed(1)} s`, width - RIGHT, height - 3);
-    return { pen, x, y, width, height };
-  }
-
-  cursor({ pen, x, height }) {
-    for (const [place, colour] of [[this.at, "#f0c674"], [this.over, "#ffffff60"]]) {
-      if (place === null || place === undefined) continue;
-      pen.fillStyle = colour;
-      pen.fillRect(x(place) - 0.75, TOP, 1.5, height - TOP - LOW);
-    }
+    return y;
   }
 
   draw() {
@@ -73,26 +89,23 @@ class Plots {
     const most = this.known > 0 ? this.share(1) : 1;
     // The deadline is in the picture where that leaves the latencies readable.
     const highest = deadline && deadline < 4 * most ? Math.max(most, deadline) : most;
-    const sheet = this.sheet(this.latency, round(Math.max(highest * 1.08, 0.1)), (ms) => `${short(ms)} ms`);
-    const { pen, x, y, width } = sheet;
-    const each = (width - LEFT - RIGHT) / this.sweeps;
-    for (let i = 0; i < this.sweeps; i++) {
-      const ms = latency_ms[i];
-      if (ms < 0) continue;
-      pen.fillStyle = deadline && ms > deadline ? "#e69f00" : "#56b4e9";
-      const high = y(0) - y(ms), wide = Math.max(Math.min(each - 1, 5), 1);
-      pen.fillRect(x(i) - wide / 2, y(ms), wide, Math.max(high, 1));
-    }
-    if (deadline && y(deadline) >= TOP) {
-      pen.strokeStyle = "#e69f00";
+    this.show(this.latency, "", (pen, width, height) => {
+      const y = this.axes(pen, width, height, round(Math.max(highest * 1.08, 0.1)), (ms) => `${short(ms)} ms`);
+      const wide = Math.max(Math.min((width - LEFT - RIGHT) / this.sweeps - 1, 5), 1);
+      for (let i = 0; i < this.sweeps; i++) {
+        const ms = latency_ms[i];
+        if (ms < 0) continue;
+        pen.fillStyle = deadline && ms > deadline ? "#ff7a6b" : "#9fb3c8";
+        pen.fillRect(this.x(i, width) - wide / 2, y(ms), wide, Math.max(y(0) - y(ms), 1));
+      }
+      if (!deadline || y(deadline) < TOP) return;
+      pen.strokeStyle = "#ff7a6b";
       pen.setLineDash([5, 4]);
       pen.beginPath();
       pen.moveTo(LEFT, y(deadline));
       pen.lineTo(width - RIGHT, y(deadline));
       pen.stroke();
-      pen.setLineDash([]);
-    }
-    this.cursor(sheet);
+    });
     const place = this.over ?? this.at, ms = latency_ms[place];
     const here = ms >= 0 ? `${ms.toFixed(2)} ms` : "not known";
     const all = this.known > 0 ? `median ${short(this.share(0.5))}, 99 % ${short(this.share(0.99))}, most ${short(most)}` : "";
@@ -104,20 +117,20 @@ class Plots {
     const kinds = this.classes.filter((kind) => kind.number > 0 && this.shown.has(kind.number));
     const counts = kinds.map((kind) => this.store.overview[kind.name]);
     const sum = (i) => counts.reduce((all, values) => all + values[i], 0);
-    let most = 1;
-    for (let i = 0; i < this.sweeps; i++) most = Math.max(most, sum(i));
-    const sheet = this.sheet(this.stack, 2 * Math.ceil(most / 2), (value) => value.toFixed(0));
-    const { pen, x, y, width } = sheet;
-    const wide = Math.max((width - LEFT - RIGHT) / this.sweeps * 0.86, 1);
-    for (let i = 0; i < this.sweeps; i++) {
-      let low = 0;
-      kinds.forEach((kind, k) => {
-        pen.fillStyle = kind.colour;
-        pen.fillRect(x(i) - wide / 2, y(low + counts[k][i]), wide, y(low) - y(low + counts[k][i]));
-        low += counts[k][i];
-      });
-    }
-    this.cursor(sheet);
+    this.show(this.stack, [...this.shown].sort().join(), (pen, width, height) => {
+      let most = 1;
+      for (let i = 0; i < this.sweeps; i++) most = Math.max(most, sum(i));
+      const y = this.axes(pen, width, height, 2 * Math.ceil(most / 2), (value) => value.toFixed(0));
+      const wide = Math.max((width - LEFT - RIGHT) / this.sweeps * 0.86, 1);
+      for (let i = 0; i < this.sweeps; i++) {
+        let low = 0;
+        kinds.forEach((kind, k) => {
+          pen.fillStyle = kind.colour;
+          pen.fillRect(this.x(i, width) - wide / 2, y(low + counts[k][i]), wide, y(low) - y(low + counts[k][i]));
+          low += counts[k][i];
+        });
+      }
+    });
     const place = this.over ?? this.at;
     const here = kinds.map((kind, k) => `${counts[k][place]} ${kind.name}`).join(", ");
     document.getElementById("classes-said").textContent = `· ${sum(place)} in sweep ${this.store.overview.sweep[place]}`;

@@ -1,7 +1,7 @@
 // What WebGL holds and how it is drawn: grid, returns, solids.
 
 const RINGS_M = [5, 10, 20, 30, 50, 75, 100, 150, 200];
-const AXES = [[[1, 0, 0], "#d55e00", "x"], [[0, 1, 0], "#009e73", "y"], [[0, 0, 1], "#56b4e9", "z"]];
+const AXES = [[[1, 0, 0], "#ff9d94", "x"], [[0, 1, 0], "#b5dd85", "y"], [[0, 0, 1], "#a6b8ff", "z"]];
 const BACKGROUND = [14 / 255, 17 / 255, 22 / 255];
 
 class Scene {

@@ -1,74 +1,18 @@
-//! Recordings made without processes: simulated sweeps through the chain's rooms, as the recorder would write them.
+//! Recordings as the chain writes them, and as nobody should.
 
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "each test file uses what it needs, and may panic")]
+
+pub mod rooms;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use classifier::{Classifier, ModelFiles};
-use clusterer::Clusterer;
-use extractor::Extractor;
-use lidar::SensorFile;
-use messages::{Clusters, Descriptors, Detections, Hop, Message, Part, Raw, Sweep, Trace, Truth};
-use simulator::{SceneFile, Simulator};
-use stage::Stage;
+use messages::{Detections, Message, Raw, Sweep, Trace, Truth};
 use zerocopy::FromZeros;
 
-pub fn config(path: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config").join(path);
-    fs::read_to_string(&path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()))
-}
-
-/// The default scene.
-pub fn scene() -> Simulator {
-    let file: SceneFile = toml::from_str(&config("scenes/default.toml")).unwrap();
-    let sensor: SensorFile = toml::from_str(&config("sensors/hdl-32e.toml")).unwrap();
-    Simulator::new(file.checked(&sensor.checked().unwrap(), &BTreeMap::new()).unwrap())
-}
-
-/// Clusterer, extractor and classifier in a row.
-pub struct Rooms {
-    clusterer: Clusterer,
-    extractor: Extractor,
-    classifier: Classifier,
-    clusters: Box<Clusters>,
-    descriptors: Box<Descriptors>,
-    pub detections: Box<Detections>,
-}
-
-impl Rooms {
-    pub fn new() -> Self {
-        fn init<S: Stage>(text: &str, complete: impl FnOnce(&mut S::Params)) -> S {
-            let mut params = toml::from_str(text).unwrap();
-            complete(&mut params);
-            S::init(params).unwrap()
-        }
-        Self {
-            clusterer: init(&config("stages/clusterer.toml"), |_| ()),
-            extractor: init(&config("stages/extractor.toml"), |_| ()),
-            classifier: init::<Classifier>(&config("stages/classifier.toml"), |params| {
-                params.overload = None;
-                let card = config("models/solids/card.toml");
-                params.files = Some(ModelFiles { card, model: config("models/solids/model.txt").into() });
-            }),
-            clusters: Clusters::new_box_zeroed().unwrap(),
-            descriptors: Descriptors::new_box_zeroed().unwrap(),
-            detections: Detections::new_box_zeroed().unwrap(),
-        }
-    }
-
-    pub fn process(&mut self, number: u64, sweep: &Sweep) {
-        let part = Part { ordinal: number, sweep: number, sectors: 1, ..Part::default() };
-        self.clusters.clear();
-        self.descriptors.clear();
-        self.detections.clear();
-        self.clusterer.process(part, sweep, &mut self.clusters);
-        self.extractor.process(part, &self.clusters, &mut self.descriptors);
-        self.classifier.process(part, &self.descriptors, &mut self.detections);
-    }
-}
+pub use rooms::{Rooms, scene, trace};
 
 /// A file as the recorder writes it.
 pub struct Writer {
@@ -114,16 +58,6 @@ impl Writer {
         self.mcap.finish().unwrap();
         self.mcap.into_inner().into_inner()
     }
-}
-
-/// A trace with this latency.
-pub fn trace(sweep: u64, latency_ns: u64) -> Trace {
-    let part = Part { ordinal: sweep, sweep, sectors: 1, ..Part::default() };
-    let mut trace = Trace { part, due_ns: 1_000_000, ..Trace::default() };
-    for hop in 1..4 {
-        trace.push(Hop { finished_ns: 1_000_000 + latency_ns * hop / 3, stage: hop as u16, ..Hop::default() });
-    }
-    trace
 }
 
 pub const RUN: [(&str, &str); 4] =
