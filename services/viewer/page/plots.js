@@ -91,12 +91,14 @@ class Plots {
     const highest = deadline && deadline < 4 * most ? Math.max(most, deadline) : most;
     this.show(this.latency, "", (pen, width, height) => {
       const y = this.axes(pen, width, height, round(Math.max(highest * 1.08, 0.1)), (ms) => `${short(ms)} ms`);
-      const wide = Math.max(Math.min((width - LEFT - RIGHT) / this.sweeps - 1, 5), 1);
+      const each = (width - LEFT - RIGHT) / this.sweeps, crowded = each < 2;
+      const wide = Math.max(Math.min(each - 1, 5), crowded ? 1.5 : 1);
       for (let i = 0; i < this.sweeps; i++) {
         const ms = latency_ms[i];
         if (ms < 0) continue;
         pen.fillStyle = deadline && ms > deadline ? "#ff7a6b" : "#9fb3c8";
-        pen.fillRect(this.x(i, width) - wide / 2, y(ms), wide, Math.max(y(0) - y(ms), 1));
+        // Bars where there is room for them, else dots: bars of a thousand sweeps would hide all but the worst.
+        pen.fillRect(this.x(i, width) - wide / 2, y(ms), wide, crowded ? 1.5 : Math.max(y(0) - y(ms), 1));
       }
       if (!deadline || y(deadline) < TOP) return;
       pen.strokeStyle = "#ff7a6b";

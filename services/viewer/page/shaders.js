@@ -8,7 +8,7 @@ const SHADERS = {
     void main() {
       gl_Position = matrix * vec4(position, 1.0);
       if (colour.a < 0.5) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-      gl_PointSize = max(size * clamp(reach / gl_Position.w, 0.6, 4.0), 1.0);
+      gl_PointSize = max(size * clamp(reach / gl_Position.w, 0.6, 2.2), 1.0);
       tint = colour.rgb;
     }`, `#version 300 es
     precision mediump float;
