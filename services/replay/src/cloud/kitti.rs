@@ -16,7 +16,7 @@ const RANGES_M: [f32; 2] = [0.5, 150.0];
 /// Elevations between which it lies [deg]: the HDL-64E sees −24.8 to +2, its corrected clouds and its kin somewhat more.
 const ELEVATIONS_DEG: [f32; 2] = [-40.0, 20.0];
 /// Azimuth within which points follow one another along a ring [rad].
-const NEAR_RAD: f64 = 0.1;
+const NEAR_RAD: f64 = 0.12;
 
 fn values(bytes: &[u8; POINT_BYTES]) -> [f32; 4] {
     std::array::from_fn(|i| f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]))

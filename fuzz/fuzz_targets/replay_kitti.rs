@@ -1,0 +1,7 @@
+//! Replays KITTI sweeps.
+
+#![no_main]
+
+use replay::Format;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| fuzz::replayed(bytes, Some(Format::Kitti)));
