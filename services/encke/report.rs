@@ -1,8 +1,7 @@
 //! `encke report`: one page from a run's report or recording. And how a report is written.
 
-use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ground::RunFigures;
 use serde::Serialize;
@@ -14,7 +13,7 @@ use crate::{Failure, outputs};
 /// Reads the file, writes the page.
 pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     let refused = |cause: &dyn std::fmt::Display| Failure::start(format!("{}: {cause}", args.file.display()));
-    let figures = read(&args.file).map_err(|cause| refused(&*cause))?;
+    let figures = RunFigures::read(&args.file).map_err(|cause| refused(&cause))?;
     if args.json {
         return crate::print(&(to_json(&figures)? + "\n"));
     }
@@ -26,10 +25,6 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     outputs::check(&[("--out", Some(&out))], &args.file)?;
     outputs::write_whole(&out, page.as_bytes())?;
     crate::print(&format!("{}\n", out.display()))
-}
-
-fn read(path: &PathBuf) -> Result<RunFigures, Box<dyn std::error::Error>> {
-    Ok(RunFigures::from_json(&fs::read(path)?)?)
 }
 
 /// Objects and lists below this depth stand on one line.

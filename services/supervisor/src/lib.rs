@@ -35,7 +35,5 @@ pub use processes::ProcessReport;
 pub use report::{DeadlineReport, LEAST_MARGIN_PCT, LatencyReport, Report, StageLatency, TraceReport, VerdictReport};
 pub use status::{StageStatus, Status, status};
 pub use summary::summary;
-pub use timeline_report::{
-    Event, HistogramReport, LatencyBucket, MachineTimeline, ProcessTimeline, SpentTime, TimelineReport,
-};
+pub use timeline_report::{Event, MachineTimeline, ProcessTimeline, TimelineReport};
 pub use watch::{Settings, run};

@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use lidar::ObstacleClass;
-use recorder::{LostSweeps, Percentiles, Snapshot, WorstSweep};
+use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, WorstSweep};
 use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
 use crate::overload::OverloadReport;
 use crate::processes::ProcessReport;
-use crate::timeline_report::{HistogramReport, TimelineReport};
+use crate::timeline_report::TimelineReport;
 
 /// Everything that is known of a run, as `--report` writes it.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -73,7 +73,7 @@ pub struct Report {
     /// How the command ends, and why.
     pub verdict: VerdictReport,
     /// The distributions that `latency_ms` and its neighbours give percentiles of.
-    pub latency_histogram_ms: HistogramReport,
+    pub latency_histogram_ms: LatencyPoints,
     /// How all this went over time.
     pub timeline: TimelineReport,
 }
@@ -190,7 +190,7 @@ impl Report {
             seam_latency_ms: snapshot.seam.percentiles(),
             deadline: deadline(plan, &snapshot, &ledger),
             overload,
-            latency_histogram_ms: HistogramReport::of(&snapshot),
+            latency_histogram_ms: LatencyPoints::of(&snapshot),
             worst_sweeps: snapshot.worst,
             steps: snapshot.steps,
             processes,

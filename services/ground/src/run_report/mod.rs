@@ -9,7 +9,9 @@ mod page;
 mod parts;
 mod plot;
 mod read;
+mod recording;
 mod tables;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod usage_plots;

@@ -92,6 +92,13 @@ impl RunFigures {
             if let Some([first, last]) = &recording.written_utc {
                 rows.push(("Written", format!("{} to {} UTC", escaped(first), escaped(last))));
             }
+            let topics = recording.messages.iter();
+            let topics: Vec<_> =
+                topics.map(|(topic, number)| format!("{} {}", count(*number), escaped(topic))).collect();
+            rows.push(("Messages", topics.join(", ")));
+            if recording.unread > 0 {
+                rows.push(("Not readable", format!("{} sweeps", count(recording.unread))));
+            }
         }
         rows.push(("Encke", if self.encke.is_empty() { "not said".to_owned() } else { escaped(&self.encke) }));
         let rows: String = rows.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{value}</dd>")).collect();

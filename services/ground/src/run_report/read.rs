@@ -1,8 +1,12 @@
 //! A report from its file, whose format is found by content.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
 use serde_json::Value;
 
-use super::RunFigures;
+use super::{RunFigures, recording};
 
 /// Why a file is no report.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +28,12 @@ pub enum RunReportError {
         /// Length of the file [bytes].
         length: usize,
     },
+    /// A recording without a sweep's detections.
+    #[error("is a recording (MCAP) without messages of {0} that can be read: record that topic")]
+    NoSweeps(&'static str),
+    /// The system gave nothing to read, or no memory.
+    #[error(transparent)]
+    System(#[from] std::io::Error),
     /// A report in which something has a type that it cannot have.
     #[error("is no report that can be shown: {0}")]
     Field(serde_json::Error),
@@ -44,6 +54,21 @@ const KNOWN: [(&[u8], &str); 8] = [
 ];
 
 impl RunFigures {
+    /// The figures of a file: a report, or a recording, from which they are worked out; found by content.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is neither.
+    pub fn read(path: &Path) -> Result<Self, RunReportError> {
+        let mut file = BufReader::new(File::open(path)?);
+        if file.fill_buf()?.starts_with(MCAP_MAGIC) {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            return recording::read(file, name);
+        }
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Self::from_json(&bytes)
+    }
+
     /// The figures of the JSON of `encke run --report`, of this version or another one.
     ///
     /// # Errors

@@ -1,8 +1,15 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::io::Cursor;
 
-use super::{RunFigures, RunReportError};
+use lidar::ObstacleClass;
+use mcap::records::{MessageHeader, Metadata};
+use messages::{ClusterSummary, Detection, Detections, Hop, Part, Raw, Trace, Verdict};
+use serde_json::{Value, json};
+use zerocopy::FromZeros;
+
+use super::{RunFigures, RunReportError, recording};
 
 /// A report of 30 sweeps as `encke run --report` writes it.
 fn report() -> Value {
@@ -210,6 +217,7 @@ fn hostile_words_and_numbers_stay_words_and_numbers() {
         }
         stretch(&mut report, &extreme);
         let page = page(&report);
+        assert!(!page.contains("NaN"), "{extreme}");
         assert!(page.len() < 2_000_000 && page.ends_with("</html>\n"), "{extreme}");
     }
 }
@@ -245,4 +253,149 @@ fn a_report_cut_anywhere_is_refused_and_never_a_panic() {
     for length in (0..whole.len()).step_by(7) {
         assert!(RunFigures::from_json(&whole.as_bytes()[..length]).is_err(), "{length}");
     }
+}
+
+const MS: u64 = 1_000_000;
+/// 2026-11-22 12:00:00 UTC.
+const NOON_NS: u64 = 1_795_348_800_000_000_000;
+
+/// A sweep of two clusters that was answered so many ms after its last return.
+fn sweep(number: u64, took_ms: u64, sectors: u32) -> Vec<u8> {
+    let start_ns = 5_000 * MS + 100 * MS * number;
+    let part = Part { ordinal: number * 4 + 3, sweep: number, sector: sectors - 1, sectors, ..Part::default() };
+    let mut trace = Trace { part, due_ns: start_ns + 100 * MS, sweep_start_ns: start_ns, ..Trace::default() };
+    let sent_ns = trace.due_ns + MS;
+    trace.push(Hop { started_ns: trace.due_ns, finished_ns: sent_ns, ..Hop::default() });
+    trace.push(Hop {
+        stage: 1,
+        received_ns: sent_ns,
+        started_ns: sent_ns,
+        finished_ns: trace.due_ns + took_ms * MS,
+        ..Hop::default()
+    });
+    let mut message = Detections::new_box_zeroed().unwrap();
+    (message.header.period_ns, message.header.complete, message.header.recorded) = (100 * MS, 1, 12);
+    for (first_member, class) in [(0, ObstacleClass::Conical), (6, ObstacleClass::Rectangular)] {
+        let summary = ClusterSummary { key: first_member, first_member, points: 6, ..ClusterSummary::default() };
+        message.detections.push(Detection { summary, class, ..Detection::default() }).unwrap();
+    }
+    message.members.extend_from_slice(&(0..12).collect::<Vec<_>>()).unwrap();
+    let mut bytes = Vec::new();
+    trace.write_raw(&mut bytes);
+    message.write_raw(&mut bytes);
+    bytes
+}
+
+/// A recording of these sweeps, a status and an event.
+fn recorded(sweeps: &[Vec<u8>], pace: &str) -> Vec<u8> {
+    let mut writer = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+    let about = [("version", "0.1.0"), ("source", "sea.pcap"), ("pace", pace), ("sectors", "1"), ("deadline_ms", "50")];
+    let about = about.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    writer.write_metadata(&Metadata { name: "encke.run".to_owned(), metadata: about.into() }).unwrap();
+    let mut channel = |topic: &str| writer.add_channel(0, topic, "encke", &BTreeMap::new()).unwrap();
+    let ids = ["/encke/raw/detections", "/encke/status", "/encke/events"].map(&mut channel);
+    let mut write = |channel: usize, number: u64, data: &[u8]| {
+        let publish_time = NOON_NS + 100 * MS * number;
+        let header = MessageHeader { channel_id: ids[channel], sequence: 0, log_time: number, publish_time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    };
+    for (number, sweep) in (0..).zip(sweeps) {
+        write(0, number, sweep);
+    }
+    let status = json!({"stages": [{"stage": "clusterer", "pid": 1, "received": 77, "published": 76, "restarts": 2}]});
+    write(1, 4, status.to_string().as_bytes());
+    write(2, 5, b"\x1a\x09said this\x22\x07restart");
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+fn read(bytes: &[u8]) -> Result<RunFigures, RunReportError> {
+    recording::read(bytes, "flight.mcap".to_owned())
+}
+
+#[test]
+fn a_recording_says_what_its_traces_and_detections_say() {
+    let sweeps: Vec<_> = [10, 11, 12, 80, 13].into_iter().zip([0, 1, 2, 3, 6]).collect();
+    let sweeps: Vec<_> = sweeps.into_iter().map(|(took_ms, number)| sweep(number, took_ms, 1)).collect();
+    let found = read(&recorded(&sweeps, "realtime")).unwrap();
+    assert_eq!((found.sweeps, found.sectors, found.period_ms), (5, 1, Some(100.0)));
+    let end_to_end = found.latency_ms.end_to_end;
+    assert_eq!((end_to_end.count, end_to_end.max.map(|ms| ms.round())), (5, Some(80.0)));
+    assert_eq!(found.obstacle_latency_ms.unwrap().count, 10);
+    let deadline = found.deadline.clone().unwrap();
+    assert_eq!((deadline.misses, deadline.deadline_ms), (3, 50.0));
+    let causes = [("clusterer compute".to_owned(), 1), ("not in the recording".to_owned(), 2)];
+    assert_eq!(deadline.causes, causes.into());
+    assert_eq!(found.detections.as_ref().unwrap()["conical"], 5);
+    assert_eq!(found.worst_sweeps.as_ref().unwrap()[0].sweep, 3);
+    let timeline = found.timeline.as_ref().unwrap();
+    assert_eq!(timeline.latency_ms.iter().map(|bucket| bucket.sweeps).sum::<u64>(), 5);
+    // The first answer came 110 ms after the first firing; the event half a second after it.
+    assert_eq!(timeline.events[0].kind, "restart");
+    assert!((timeline.events[0].t_s - 0.61).abs() < 1e-6);
+    let recording = found.recording.as_ref().unwrap();
+    let [first, last] = recording.written_utc.clone().unwrap();
+    assert_eq!((first.as_str(), last.as_str()), ("2026-11-22 12:00:00", "2026-11-22 12:00:00"));
+    assert_eq!((recording.unread, &recording.torn, recording.messages["/encke/raw/detections"]), (0, &None, 5));
+    expect(
+        &found.to_html(),
+        &[
+            "Run of sea.pcap",
+            "Figures worked out from a recording.",
+            "<td class=\"n\">77</td>",
+            "deadline 50 ms",
+            "said this",
+        ],
+    );
+    let json = serde_json::to_vec(&found).unwrap();
+    assert_eq!(RunFigures::from_json(&json).unwrap(), found);
+}
+
+#[test]
+fn a_recording_in_sectors_has_no_obstacle_latencies_and_one_without_pace_no_deadline() {
+    let sweeps = [sweep(0, 10, 4), sweep(1, 90, 4)];
+    let found = read(&recorded(&sweeps, "realtime")).unwrap();
+    assert_eq!((found.sectors, found.latency_ms.end_to_end.count, found.obstacle_latency_ms), (4, 2, None));
+    let found = read(&recorded(&sweeps, "fast")).unwrap();
+    assert_eq!((found.deadline, found.pace.as_str()), (None, "fast"));
+}
+
+#[test]
+fn a_torn_recording_is_used_up_to_the_tear_and_never_a_panic() {
+    let sweeps: Vec<_> = (0..20).map(|number| sweep(number, 10, 1)).collect();
+    let whole = recorded(&sweeps, "realtime");
+    let mut used = 0;
+    for length in (0..whole.len()).step_by(97) {
+        match read(&whole[..length]) {
+            Ok(found) => {
+                assert!(found.recording.as_ref().unwrap().torn.is_some(), "{length}");
+                assert!(found.sweeps <= 20);
+                used = used.max(found.sweeps);
+            }
+            Err(error) => assert!(matches!(error, RunReportError::NoSweeps(_)), "{error}"),
+        }
+    }
+    assert_eq!(used, 20);
+    let mut spoilt = whole;
+    for at in (0..spoilt.len()).step_by(61) {
+        spoilt[at] ^= 0x55;
+        let _ = read(&spoilt).map(|found| found.to_html());
+        spoilt[at] ^= 0x55;
+    }
+}
+
+#[test]
+fn a_sweep_that_cannot_be_read_and_one_that_was_rejected_are_told() {
+    let mut short = sweep(1, 10, 1);
+    short.truncate(short.len() - 3);
+    let mut stale = Trace::read_raw(&sweep(2, 10, 1)).unwrap().0;
+    stale.hops[1].verdict = Verdict::RejectedStale;
+    let mut rejected = Vec::new();
+    stale.write_raw(&mut rejected);
+    Detections::new_box_zeroed().unwrap().write_raw(&mut rejected);
+    let found = read(&recorded(&[sweep(0, 10, 1), short, rejected, sweep(3, 10, 1)], "realtime")).unwrap();
+    assert_eq!(found.recording.as_ref().unwrap().unread, 1);
+    let causes = [("clusterer stale".to_owned(), 1), ("not in the recording".to_owned(), 1)];
+    assert_eq!(found.deadline.as_ref().unwrap().causes, causes.into());
+    expect(&found.to_html(), &["1 sweeps"]);
 }
