@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ::mcap::records::{Record, op};
+use ::mcap::records::op;
 use messages::{Message, Sweep};
 
 use crate::error::ReplayError;
@@ -47,6 +47,25 @@ struct Channel {
     what: String,
 }
 
+/// Fields of a record. `mcap`'s own reading of them allocates whatever length a string claims.
+struct Fields<'a>(&'a [u8]);
+
+impl Fields<'_> {
+    fn number(&mut self) -> Option<u16> {
+        let (bytes, rest) = self.0.split_first_chunk::<2>()?;
+        self.0 = rest;
+        Some(u16::from_le_bytes(*bytes))
+    }
+
+    fn string(&mut self) -> Option<String> {
+        let (length, rest) = self.0.split_first_chunk::<4>()?;
+        let (text, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+        self.0 = rest;
+        // Names are for people and for comparison.
+        Some(String::from_utf8_lossy(text).into_owned())
+    }
+}
+
 /// Channels by their number, as a file introduces them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Channels {
@@ -55,25 +74,29 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    /// Takes note of a schema or a channel; whether it was a channel.
+    /// Takes note of a schema or a channel; whether it was a channel. What cannot be read is none.
     pub(super) fn learn(&mut self, opcode: u8, data: &[u8]) -> bool {
-        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
-            return false;
-        }
-        match ::mcap::parse_record(opcode, data) {
-            Ok(Record::Schema { header, .. }) => {
-                self.schemas.insert(header.id, header.name);
+        let mut fields = Fields(data);
+        match opcode {
+            op::SCHEMA => {
+                if let Some((id, name)) = fields.number().zip(fields.string()) {
+                    self.schemas.insert(id, name);
+                }
                 false
             }
-            Ok(Record::Channel(channel)) => {
-                let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
-                let kind = Kind::of(&channel.message_encoding, schema);
-                let what = format!("{schema} in {}", channel.message_encoding);
-                self.channels.insert(channel.id, Channel { topic: channel.topic, kind, what });
-                true
-            }
+            op::CHANNEL => self.learn_channel(fields).is_some(),
             _ => false,
         }
+    }
+
+    fn learn_channel(&mut self, mut fields: Fields<'_>) -> Option<()> {
+        let (id, schema) = (fields.number()?, fields.number()?);
+        let (topic, encoding) = (fields.string()?, fields.string()?);
+        let schema = self.schemas.get(&schema).map_or("", String::as_str);
+        let kind = Kind::of(&encoding, schema);
+        let what = format!("{schema} in {encoding}");
+        self.channels.insert(id, Channel { topic, kind, what });
+        Some(())
     }
 
     /// Whether the messages of channel `id` are those of `choice`.
