@@ -14,7 +14,9 @@ use crate::time::absolute_ns;
 const LATE_US: u64 = 10_000;
 const TURN: f64 = TURN_CDEG as f64;
 /// Turns after which a field of view must have shown its edges.
-const TURNS_TO_LOOK_AT: f64 = 2.0;
+const TURNS_TO_LOOK_AT: f64 = 3.0;
+/// Least gap between two packets that may be that of a field of view, if it is there again a turn later [0.01°].
+const LEAST_GAP_CDEG: f64 = 1_000.0;
 
 /// One firing cycle of all lasers.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +86,8 @@ pub(crate) struct Cycles {
     is_edge: bool,
     /// What the sensor is set to leave out of the turn, once that was seen.
     gap: Option<Gap>,
+    /// A gap between two packets: lost ones, or the field of view.
+    maybe_gap: Option<Gap>,
 }
 
 impl Cycles {
@@ -117,6 +121,7 @@ impl Cycles {
             is_break: false,
             is_edge: false,
             gap: None,
+            maybe_gap: None,
         })
     }
 
@@ -218,7 +223,7 @@ impl Cycles {
             let share = done as f64 / all as f64;
             let advance_cdeg = (self.first_cdeg() - from.next_cdeg).rem_euclid(TURN);
             let azimuth_cdeg = (from.next_cdeg + share * advance_cdeg).rem_euclid(TURN);
-            if self.gap.is_some_and(|gap| gap.holds(azimuth_cdeg)) {
+            if self.gap.is_some_and(|gap| gap.covers(azimuth_cdeg)) {
                 self.is_edge = true;
                 continue;
             }
@@ -347,6 +352,12 @@ impl Cycles {
         let time_ns = before.time_ns + step_us * 1_000;
         let lost_ns = time_ns.saturating_sub(before.next_ns);
         let supposed_cdeg = lost_ns as f64 * rate;
+        // As far as time has passed the head must have turned.
+        let do_agree = (turned_cdeg - supposed_cdeg).abs() <= supposed_cdeg / 4.0 + 3.0 * slot_cdeg;
+        if self.gap.is_none() && self.suspect_us.is_none() && do_agree && turned_cdeg > LEAST_GAP_CDEG {
+            let found = Gap::between(before.next_cdeg - slot_cdeg, self.first_cdeg(), slot_cdeg);
+            self.gap = self.maybe_gap.replace(found).filter(|known| known.is_same(&found)).map(|_| found);
+        }
         let gap = self
             .gap
             .filter(|gap| 2.0 * supposed_cdeg > gap.width_cdeg() && gap.is_passed(before.next_cdeg, turned_cdeg));
@@ -362,11 +373,11 @@ impl Cycles {
             }
         };
         let lost_cdeg = lost * packet_ns as f64 * rate;
-        // As far as time has passed the head must have turned, unless it stands still.
-        let tolerance_cdeg = supposed_cdeg / 4.0 + 3.0 * slot_cdeg;
-        let agree = lost == 0.0 || slot_cdeg < 1.0 || (turned_cdeg - supposed_cdeg).abs() <= tolerance_cdeg;
+        let agree = lost == 0.0 || slot_cdeg < 1.0 || do_agree;
+        // Set back by less than a packet.
+        let overlaps = time_ns + self.slot_ns() < before.next_ns;
         let is_short = lost_cdeg < TURN / 2.0 && lost_cycles <= lidar::MAX_COLUMNS as f64;
-        if !is_late && is_short && agree {
+        if !is_late && !overlaps && is_short && agree {
             self.time_ns = time_ns;
             if lost == 0.0 {
                 self.is_edge = gap.is_some();
@@ -377,7 +388,7 @@ impl Cycles {
             let what = "by the stamps, packets are missing before this one";
             return Ok(Some((Fault::LostPacket, lost as u64, what)));
         }
-        if !is_late && goes_on && step_us * 1_000 <= packet_ns + LATE_US * 1_000 {
+        if !is_late && !overlaps && goes_on && step_us * 1_000 <= packet_ns + LATE_US * 1_000 {
             self.time_ns = time_ns;
             let what = "the sensor's clock was set forward by a little, and no packet is missing";
             return Ok(Some((Fault::ClockStep, 1, what)));

@@ -10,6 +10,7 @@ pub(super) struct Gap {
     /// Where the block after the last one before it would have been [0.01°].
     from_cdeg: f64,
     width_cdeg: f64,
+    step_cdeg: f64,
     /// The edges move by up to a block from turn to turn; within this they are the same [0.01°].
     tolerance_cdeg: f64,
 }
@@ -19,7 +20,7 @@ impl Gap {
     pub(super) fn between(last_cdeg: f64, next_cdeg: f64, step_cdeg: f64) -> Self {
         let from_cdeg = (last_cdeg + step_cdeg).rem_euclid(TURN);
         let width_cdeg = (next_cdeg - from_cdeg).rem_euclid(TURN);
-        Self { from_cdeg, width_cdeg, tolerance_cdeg: (3.0 * step_cdeg).min(width_cdeg / 3.0) }
+        Self { from_cdeg, width_cdeg, step_cdeg, tolerance_cdeg: (3.0 * step_cdeg).min(width_cdeg / 3.0) }
     }
 
     /// Azimuth that it takes [0.01°].
@@ -40,6 +41,11 @@ impl Gap {
         (self.tolerance_cdeg..self.width_cdeg - self.tolerance_cdeg).contains(&inside)
     }
 
+    /// Whether a block at an azimuth would not be sent.
+    pub(super) fn covers(&self, azimuth_cdeg: f64) -> bool {
+        (azimuth_cdeg - self.from_cdeg + self.step_cdeg / 2.0).rem_euclid(TURN) < self.width_cdeg
+    }
+
     /// Whether a head that turned by `advance_cdeg` from `start_cdeg` on passed over all of it.
     pub(super) fn is_passed(&self, start_cdeg: f64, advance_cdeg: f64) -> bool {
         let ahead_cdeg = (self.from_cdeg - start_cdeg + self.tolerance_cdeg).rem_euclid(TURN) - self.tolerance_cdeg;
@@ -58,6 +64,9 @@ mod tests {
             let sut = Gap::between(at(-20.0), at(18_000.0), 20.0);
             assert_eq!(sut.width_cdeg(), 18_000.0);
             assert!(sut.holds(at(9_000.0)) && sut.holds(at(61.0)) && !sut.holds(at(30.0)) && !sut.holds(at(18_010.0)));
+            assert!(
+                sut.covers(at(1.0)) && sut.covers(at(17_980.0)) && !sut.covers(at(-19.0)) && !sut.covers(at(18_000.0))
+            );
             assert!(sut.is_passed(at(0.0), 18_000.0));
             assert!(sut.is_passed(at(20.0), 17_990.0), "edges have some play");
             assert!(sut.is_passed(at(-5_000.0), 23_000.0));

@@ -38,7 +38,7 @@ impl Probe {
         let mut packet = Packet::default();
         let (mut steps_us, mut before_us) = (Vec::with_capacity(PROBED), None);
         let (mut product_id, mut is_dual) = (None, false);
-        while steps_us.len() < PROBED {
+        for _ in 0..10 * PROBED {
             let Got::Packet(_) = capture.next(&mut packet, &mut faults)? else { break };
             if !(0..BLOCKS).any(|block| packet.is_block(block)) {
                 continue;
@@ -46,10 +46,14 @@ impl Probe {
             product_id = product_id.or(Some(packet.product_id()));
             is_dual = packet.is_dual();
             let stamp_us = packet.stamp_us() % HOUR_US;
-            if let Some(before_us) = before_us.replace(stamp_us) {
-                let step_us = (stamp_us + HOUR_US - before_us) % HOUR_US;
-                // Recorded twice, on two interfaces say.
+            let step_us = (stamp_us + HOUR_US - before_us.unwrap_or(stamp_us)) % HOUR_US;
+            // Packets may have been recorded twice, on two interfaces say: only those ahead of all before count.
+            if step_us < HOUR_US / 2 {
+                before_us = Some(stamp_us);
                 steps_us.extend((step_us > 0).then_some(step_us));
+            }
+            if steps_us.len() == PROBED {
+                break;
             }
         }
         capture.rewind();

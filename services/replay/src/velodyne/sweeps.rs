@@ -255,11 +255,10 @@ impl Sweeps {
         let packet = self.cycles.packet();
         // A second cycle's channels lie behind those of the first.
         let channels = |block| packet.channels(block).and_then(|all| all.get(half * lasers..)).unwrap_or(NONE);
-        // In dual-return mode the last returns come before the strongest.
-        let (one, other) = match (self.cycles.blocks_per_slot(), self.is_dual_kept) {
-            (1, _) => (channels(slot), None),
-            (_, false) => (channels(slot * 2 + 1), None),
-            (_, true) => (channels(slot * 2), Some(channels(slot * 2 + 1))),
+        // In dual-return mode the last returns come first.
+        let (one, other) = match self.cycles.blocks_per_slot() {
+            1 => (channels(slot), None),
+            _ => (channels(slot * 2), Some(channels(slot * 2 + 1))),
         };
         let column = azimuth_rad.sin_cos();
         let (limits, quantum_m) = (&self.limits, self.sensor.quantum_m());
@@ -273,11 +272,15 @@ impl Sweeps {
         match other {
             None => self.beams.iter().zip(one).for_each(|(beam, &echo)| put(sweep, beam, echo)),
             Some(other) => {
-                for (beam, (&echo, &second)) in self.beams.iter().zip(one.iter().zip(other)) {
-                    put(sweep, beam, echo);
+                for (beam, (&last, &other)) in self.beams.iter().zip(one.iter().zip(other)) {
+                    if !self.is_dual_kept {
+                        put(sweep, beam, stronger(last, other));
+                        continue;
+                    }
+                    put(sweep, beam, last);
                     // The same echo twice is one return.
-                    if second != echo {
-                        put(sweep, beam, second);
+                    if other != last {
+                        put(sweep, beam, other);
                     }
                 }
             }
@@ -295,6 +298,13 @@ impl Sweeps {
             beam.turned = (turn_rad.cos(), turn_rad.sin());
         }
     }
+}
+
+/// The stronger of two echoes of a firing. Beside the last one a packet has the strongest, or the second strongest where
+/// the last is the strongest (VLP-32C User Manual, section 9.3.2): intensities tell which.
+fn stronger(last: [u8; 3], other: [u8; 3]) -> [u8; 3] {
+    let is_return = |[low, high, _]: [u8; 3]| low != 0 || high != 0;
+    if is_return(last) && (!is_return(other) || last[2] > other[2]) { last } else { other }
 }
 
 /// From the sensor's azimuth (clockwise) to the frame's (counter-clockwise, in [−π, π), after rounding too).
