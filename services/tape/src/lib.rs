@@ -24,9 +24,12 @@
 mod cloud;
 mod colours;
 mod counts;
+mod early;
 mod hold;
 mod joiner;
+mod kept;
 mod names;
+mod pairs;
 mod reel;
 mod reels;
 mod scene;

@@ -1,6 +1,5 @@
 //! The files of a run: begun, turned over by size and age, removed for the quota, closed by an error and tried again.
 
-use std::collections::VecDeque;
 use std::fs::OpenOptions;
 use std::io;
 use std::os::unix::fs::FileTypeExt;
@@ -8,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::Topic;
 use crate::counts::{Tally, add};
-use crate::names::{is_ours, numbered, present};
+use crate::kept::KeptFiles;
+use crate::names::numbered;
 use crate::reel::{About, Closed, Reel, Stamps};
 use crate::settings::{Settings, TapeError, WhenFull};
 use crate::sink::Target;
@@ -23,13 +23,6 @@ pub(crate) type Open = Box<dyn Fn(&Path) -> io::Result<Box<dyn Target>> + Send>;
 /// Opens files of the file system.
 pub(crate) fn on_disk() -> Open {
     Box::new(|path| Ok(Box::new(OpenOptions::new().write(true).create(true).truncate(true).open(path)?)))
-}
-
-/// A file of the run that is no longer written.
-struct Kept {
-    path: PathBuf,
-    bytes: u64,
-    messages: Tally,
 }
 
 /// What is being written.
@@ -57,16 +50,12 @@ pub(crate) struct Reels {
     failing: bool,
     /// Attempts in a row of which no file was completed.
     attempts: u32,
-    /// Files that the quota counts, the oldest first; not the one being written.
-    kept: VecDeque<Kept>,
+    /// All files but the one being written.
+    pub(crate) kept: KeptFiles,
     /// Whether there can be more than one file: not where the path is a device.
     regular: bool,
     pub(crate) files: u64,
-    pub(crate) removed_files: u64,
     pub(crate) failure: Option<String>,
-    /// Of files that are closed and there.
-    written: Tally,
-    pub(crate) removed: Tally,
     pub(crate) lost: Tally,
     closed_bytes: u64,
 }
@@ -100,45 +89,21 @@ impl Reels {
             empty: true,
             failing: false,
             attempts: 0,
-            kept: VecDeque::new(),
+            kept: KeptFiles::default(),
             regular,
             files: 0,
-            removed_files: 0,
             failure: None,
-            written: Tally::default(),
-            removed: Tally::default(),
             lost: Tally::default(),
             closed_bytes: 0,
         };
         if regular {
-            reels.look(resume).map_err(create)??;
+            let foreign = |other| TapeError::Foreign { path: path.to_owned(), other };
+            reels.number = reels.kept.look(path, resume).map_err(create)?.map_err(foreign)?;
         }
         // What cannot even be opened is refused; what cannot be written is an event, as later on.
         let target = (reels.open)(&numbered(path, reels.number)).map_err(create)?;
         reels.begin(target, utc_ns);
         Ok(reels)
-    }
-
-    /// Finds the files of earlier lives to go on after, or clears an earlier run's out of the way.
-    fn look(&mut self, resume: bool) -> io::Result<Result<(), TapeError>> {
-        let numbers = present(&self.path)?;
-        for &number in &numbers {
-            let other = numbered(&self.path, number);
-            if number > 0 && !is_ours(&other)? {
-                return Ok(Err(TapeError::Foreign { path: self.path.clone(), other }));
-            }
-        }
-        for number in numbers {
-            let path = numbered(&self.path, number);
-            if resume {
-                let bytes = path.metadata()?.len();
-                self.kept.push_back(Kept { path, bytes, messages: Tally::default() });
-                self.number = number + 1;
-            } else if number > 0 {
-                std::fs::remove_file(path)?;
-            }
-        }
-        Ok(Ok(()))
     }
 
     fn begin(&mut self, target: Box<dyn Target>, utc_ns: u64) {
@@ -244,36 +209,24 @@ impl Reels {
     }
 
     fn keep(&mut self, closed: Closed) {
-        add(&mut self.written, &closed.messages);
         self.closed_bytes += closed.bytes;
         self.empty = closed.messages == Tally::default();
         if !self.empty {
-            let path = numbered(&self.path, self.number);
-            self.kept.push_back(Kept { path, bytes: closed.bytes, messages: closed.messages });
+            self.kept.keep(numbered(&self.path, self.number), closed.bytes, closed.messages);
         }
     }
 
     fn keep_quota(&mut self, utc_ns: u64) {
         let Some(quota) = self.settings.quota_bytes.filter(|_| self.regular) else { return };
-        let now = |reels: &Self| reels.current_bytes() + reels.kept.iter().map(|kept| kept.bytes).sum::<u64>();
-        while now(self) > quota {
+        while self.current_bytes() + self.kept.bytes() > quota {
             if self.settings.when_full == WhenFull::Stop {
                 self.finish(utc_ns);
                 self.state = State::Full;
                 tracing::warn!(file = %self.path.display(), "recording ends, its quota is used up");
                 return;
             }
-            let Some(oldest) = self.kept.pop_front() else { return };
-            match std::fs::remove_file(&oldest.path) {
-                Ok(()) => tracing::info!(file = %oldest.path.display(), "oldest recording removed for the quota"),
-                Err(error) => {
-                    tracing::warn!(file = %oldest.path.display(), %error, "cannot remove the oldest recording")
-                }
-            }
-            self.removed_files += 1;
-            add(&mut self.removed, &oldest.messages);
-            for (written, removed) in self.written.iter_mut().zip(&oldest.messages) {
-                *written = written.saturating_sub(*removed);
+            if !self.kept.remove_oldest() {
+                return;
             }
         }
     }
@@ -292,7 +245,7 @@ impl Reels {
 
     /// Messages of this life in files that are there.
     pub(crate) fn messages(&self) -> Tally {
-        let mut sum = self.written;
+        let mut sum = self.kept.written;
         if let State::Writing(reel, _) = &self.state {
             add(&mut sum, reel.committed());
         }

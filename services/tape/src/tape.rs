@@ -4,43 +4,18 @@ use std::path::Path;
 
 use messages::{Clusters, Descriptors, Detections, Joiner, Raw, Sweep, Trace, Truth};
 
-use crate::cloud::{Clouds, Clustered};
+use crate::cloud::Clouds;
 use crate::counts::{Counts, TopicCounts};
-use crate::hold::Hold;
+use crate::early::{Early, Moment, What};
 use crate::joiner::DetectionsJoiner;
+use crate::pairs::Pairs;
 use crate::reel::{About, Stamps};
 use crate::reels::{Open, Reels, on_disk};
 use crate::scene::Scenes;
 use crate::settings::{Settings, TapeError};
 use crate::stream::Stream;
 use crate::topic::Topic;
-use crate::words::{Event, put_event, put_truth};
-
-/// Events and states that wait for the first sweep to learn the sensor's time.
-const MOST_EARLY: usize = 256;
-
-/// What of a sweep waits for its detections.
-#[derive(Default)]
-struct Echoes {
-    sensor_time_ns: u64,
-    returns: Vec<lidar::Return>,
-    recorded_index: Vec<u32>,
-}
-
-/// What of a sweep's detections waits for its returns.
-#[derive(Default)]
-struct Verdicts {
-    detections: Vec<messages::Detection>,
-    members: Vec<u32>,
-}
-
-/// A message that waits for the sensor's time.
-struct Early {
-    topic: Topic,
-    utc_ns: u64,
-    event: Option<(crate::Level, String, String)>,
-    json: Vec<u8>,
-}
+use crate::words::{Event, put_truth};
 
 /// A recording being written. Host time (UTC) comes with every call; nothing is read here but files.
 pub struct Tape {
@@ -53,19 +28,16 @@ pub struct Tape {
     /// Parts by ordinal.
     raw_clusters: Stream,
     raw_descriptors: Stream,
-    echoes: Hold<Echoes>,
-    verdicts: Hold<Verdicts>,
-    /// Sweeps written with their clusters.
-    paired: u64,
+    pairs: Pairs,
     first_sweep: u64,
     clouds: Clouds,
     scenes: Scenes,
     buffer: Vec<u8>,
-    early: Vec<Early>,
+    early: Early,
     /// Sensor time of the newest sweep [ns].
     sensor_time_ns: Option<u64>,
-    events: u32,
-    states: u32,
+    /// Events and states so far.
+    moments: [u32; 2],
     /// Of the latest commit.
     done_sweeps: u64,
 }
@@ -96,7 +68,6 @@ impl Tape {
     ) -> Result<Self, TapeError> {
         let first = resume.unwrap_or(0);
         let first_part = first.saturating_mul(about.sectors.into());
-        let hold = settings.hold_sweeps;
         Ok(Self {
             sweeps: Stream::new(first),
             joiner: Joiner::new().ok_or(TapeError::Memory)?,
@@ -105,17 +76,14 @@ impl Tape {
             truths: Stream::new(first),
             raw_clusters: Stream::new(first_part),
             raw_descriptors: Stream::new(first_part),
-            echoes: Hold::new(hold),
-            verdicts: Hold::new(hold),
-            paired: 0,
+            pairs: Pairs::new(settings.hold_sweeps),
             first_sweep: first,
             clouds: Clouds::default(),
             scenes: Scenes::default(),
             buffer: Vec::new(),
-            early: Vec::new(),
+            early: Early::default(),
             sensor_time_ns: None,
-            events: 0,
-            states: 0,
+            moments: [0; 2],
             done_sweeps: first,
             reels: Reels::start(settings, path, about, resume.is_some(), open, utc_ns)?,
         })
@@ -143,22 +111,11 @@ impl Tape {
             self.clouds.sweep(whole, &mut self.buffer);
             self.reels.write(Topic::Sweep, &stamps, &self.buffer);
         }
-        if !self.reels.settings().has(Topic::Clusters) {
-            return;
-        }
-        let (returns, recorded_index) = (&whole.returns[..], &whole.recorded_index[..]);
-        if let Some(Verdicts { detections, members }) = self.verdicts.get(part.sweep) {
-            let of = Clustered { sensor_time_ns, returns, recorded_index, detections, members };
-            self.buffer.clear();
-            if self.clouds.clusters(&of, &mut self.buffer) {
+        if self.reels.settings().has(Topic::Clusters) {
+            let settled = self.detections.next() > part.sweep;
+            if self.pairs.sweep(part.sweep, whole, settled, &mut self.clouds, &mut self.buffer) {
                 self.reels.write(Topic::Clusters, &stamps, &self.buffer);
-                self.paired += 1;
             }
-        } else if self.detections.next() <= part.sweep {
-            let echoes = self.echoes.put(part.sweep);
-            echoes.sensor_time_ns = sensor_time_ns;
-            refill(&mut echoes.returns, returns);
-            refill(&mut echoes.recorded_index, recorded_index);
         }
     }
 
@@ -184,21 +141,11 @@ impl Tape {
             self.scenes.detections(whole, &mut self.buffer);
             self.reels.write(Topic::Detections, &stamps, &self.buffer);
         }
-        if !self.reels.settings().has(Topic::Clusters) {
-            return;
-        }
-        let (detections, members) = (&whole.detections[..], &whole.members[..]);
-        if let Some(Echoes { sensor_time_ns, returns, recorded_index }) = self.echoes.get(part.sweep) {
-            let of = Clustered { sensor_time_ns: *sensor_time_ns, returns, recorded_index, detections, members };
-            self.buffer.clear();
-            if self.clouds.clusters(&of, &mut self.buffer) {
+        if self.reels.settings().has(Topic::Clusters) {
+            let settled = self.sweeps.next() > part.sweep;
+            if self.pairs.detections(part.sweep, whole, settled, &mut self.clouds, &mut self.buffer) {
                 self.reels.write(Topic::Clusters, &stamps, &self.buffer);
-                self.paired += 1;
             }
-        } else if self.sweeps.next() <= part.sweep {
-            let verdicts = self.verdicts.put(part.sweep);
-            refill(&mut verdicts.detections, detections);
-            refill(&mut verdicts.members, members);
         }
     }
 
@@ -244,42 +191,31 @@ impl Tape {
 
     /// Takes what `encke ctl status --json` says. Before the first sweep it waits, to be stamped with sensor time.
     pub fn status(&mut self, utc_ns: u64, json: &[u8]) {
-        let Some(sensor_time_ns) = self.sensor_time_ns else {
-            self.wait(Early { topic: Topic::Status, utc_ns, event: None, json: json.to_vec() });
-            return;
-        };
-        if self.reels.settings().has(Topic::Status) {
-            let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: self.states };
-            self.states = self.states.wrapping_add(1);
-            self.reels.write(Topic::Status, &stamps, json);
-        }
+        self.moment(Moment { topic: Topic::Status, utc_ns, what: What::Status(json) });
     }
 
     /// Takes something that happened. Before the first sweep it waits, to be stamped with sensor time.
     pub fn event(&mut self, utc_ns: u64, event: &Event<'_>) {
-        let Some(sensor_time_ns) = self.sensor_time_ns else {
-            let event = Some((event.level, event.name.into(), event.message.into()));
-            self.wait(Early { topic: Topic::Events, utc_ns, event, json: Vec::new() });
-            return;
-        };
-        if self.reels.settings().has(Topic::Events) {
-            self.buffer.clear();
-            put_event(event, sensor_time_ns, &mut self.buffer);
-            let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: self.events };
-            self.events = self.events.wrapping_add(1);
-            self.reels.write(Topic::Events, &stamps, &self.buffer);
-        }
+        self.moment(Moment { topic: Topic::Events, utc_ns, what: What::Event(*event) });
     }
 
-    fn wait(&mut self, early: Early) {
-        if !self.reels.settings().has(early.topic) {
+    fn moment(&mut self, moment: Moment<'_>) {
+        let topic = moment.topic;
+        if !self.reels.settings().has(topic) {
             return;
         }
-        if self.early.len() < MOST_EARLY {
-            self.early.push(early);
-        } else {
-            self.reels.lost[early.topic as usize] += 1;
-        }
+        let Some(sensor_time_ns) = self.sensor_time_ns else {
+            if !self.early.keep(&moment) {
+                self.reels.lost[topic as usize] += 1;
+            }
+            return;
+        };
+        self.buffer.clear();
+        moment.put(sensor_time_ns, &mut self.buffer);
+        let count = &mut self.moments[usize::from(topic == Topic::Status)];
+        let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns: moment.utc_ns, sequence: *count };
+        *count = count.wrapping_add(1);
+        self.reels.write(topic, &stamps, &self.buffer);
     }
 
     /// Learns the sensor's time, and writes what has waited for it.
@@ -292,11 +228,8 @@ impl Tape {
     }
 
     fn write_early(&mut self) {
-        for Early { utc_ns, event, json, .. } in std::mem::take(&mut self.early) {
-            match event {
-                Some((level, name, message)) => self.event(utc_ns, &Event { level, name: &name, message: &message }),
-                None => self.status(utc_ns, &json),
-            }
+        for kept in self.early.take() {
+            self.moment(kept.moment());
         }
     }
 
@@ -335,7 +268,7 @@ impl Tape {
             let never_came = match topic {
                 Topic::Sweep | Topic::RawSweep => self.sweeps.lost(),
                 Topic::Detections | Topic::RawDetections => self.detections.lost(),
-                Topic::Clusters => (paired_below - self.first_sweep).saturating_sub(self.paired),
+                Topic::Clusters => (paired_below - self.first_sweep).saturating_sub(self.pairs.paired),
                 Topic::Truth => self.truths.lost(),
                 Topic::RawClusters => self.raw_clusters.lost(),
                 Topic::RawDescriptors => self.raw_descriptors.lost(),
@@ -344,7 +277,7 @@ impl Tape {
             TopicCounts {
                 topic: topic.name().into(),
                 messages: messages[topic as usize],
-                removed: reels.removed[topic as usize],
+                removed: reels.kept.removed[topic as usize],
                 lost: reels.lost[topic as usize] + never_came,
             }
         };
@@ -352,7 +285,7 @@ impl Tape {
         Counts {
             topics: reels.settings().topics().iter().map(count).collect(),
             files: reels.files,
-            removed_files: reels.removed_files,
+            removed_files: reels.kept.removed_files,
             bytes: reels.bytes(),
             doubles: streams.iter().map(|stream| stream.doubles()).sum(),
             failure: reels.failure.clone(),
@@ -377,9 +310,4 @@ impl Tape {
             None => Ok(()),
         }
     }
-}
-
-fn refill<T: Copy>(to: &mut Vec<T>, from: &[T]) {
-    to.clear();
-    to.extend_from_slice(from);
 }
