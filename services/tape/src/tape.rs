@@ -1,11 +1,12 @@
 //! The recording: what comes in parts is joined, what belongs together is brought together, all of it goes to files.
 
+mod account;
+
 use std::path::Path;
 
 use messages::{Clusters, Descriptors, Detections, Joiner, Raw, Sweep, Trace, Truth};
 
 use crate::cloud::Clouds;
-use crate::counts::{Counts, TopicCounts};
 use crate::early::{Early, Moment, What};
 use crate::joiner::DetectionsJoiner;
 use crate::pairs::Pairs;
@@ -238,58 +239,6 @@ impl Tape {
     pub fn checkpoint(&mut self, utc_ns: u64) {
         self.reels.commit(utc_ns);
         self.done_sweeps = self.settled();
-    }
-
-    /// All sweeps below this number are in the system's hands with all that is written of a sweep, or were given up.
-    /// Truth and raw parts in between do not count. Rises with [`Tape::checkpoint`], and where a chunk has ended.
-    pub fn done_sweeps(&mut self) -> u64 {
-        if !self.reels.is_open() {
-            self.done_sweeps = self.settled();
-        }
-        self.done_sweeps
-    }
-
-    fn settled(&self) -> u64 {
-        let has = |topics: &[Topic]| topics.iter().any(|&topic| self.reels.settings().has(topic));
-        let sweeps = has(&[Topic::RawSweep, Topic::Sweep, Topic::Clusters]).then_some(self.sweeps.next());
-        let detections =
-            has(&[Topic::RawDetections, Topic::Detections, Topic::Clusters]).then_some(self.detections.next());
-        match (sweeps, detections) {
-            (Some(one), Some(other)) => one.min(other),
-            (one, other) => one.or(other).unwrap_or(u64::MAX),
-        }
-    }
-
-    /// What is in the files and what is lost, as of the latest commit; what is in an open chunk is in neither.
-    pub fn counts(&self) -> Counts {
-        let reels = &self.reels;
-        let (messages, paired_below) = (reels.messages(), self.sweeps.next().min(self.detections.next()));
-        let count = |&topic: &Topic| {
-            let never_came = match topic {
-                Topic::Sweep | Topic::RawSweep => self.sweeps.lost(),
-                Topic::Detections | Topic::RawDetections => self.detections.lost(),
-                Topic::Clusters => (paired_below - self.first_sweep).saturating_sub(self.pairs.paired),
-                Topic::Truth => self.truths.lost(),
-                Topic::RawClusters => self.raw_clusters.lost(),
-                Topic::RawDescriptors => self.raw_descriptors.lost(),
-                Topic::Events | Topic::Status => 0,
-            };
-            TopicCounts {
-                topic: topic.name().into(),
-                messages: messages[topic as usize],
-                removed: reels.kept.removed[topic as usize],
-                lost: reels.lost[topic as usize] + never_came,
-            }
-        };
-        let streams = [&self.sweeps, &self.detections, &self.truths, &self.raw_clusters, &self.raw_descriptors];
-        Counts {
-            topics: reels.settings().topics().iter().map(count).collect(),
-            files: reels.files,
-            removed_files: reels.kept.removed_files,
-            bytes: reels.bytes(),
-            doubles: streams.iter().map(|stream| stream.doubles()).sum(),
-            failure: reels.failure.clone(),
-        }
     }
 
     /// Gives up what has not come, completes the file and closes it. Nothing is to be handed over afterwards. An error
