@@ -147,6 +147,7 @@ impl Cycles {
         self.capture.rewind();
         self.ahead_arrival = None;
         self.cdeg_per_ns = 0.0;
+        self.maybe_gap = None;
         self.interrupt();
     }
 
@@ -300,10 +301,9 @@ impl Cycles {
         }
         self.suspect_us = None;
         self.cdeg_per_ns = rate;
-        if self.gap.is_some_and(|gap| gap.holds(self.first_cdeg())) {
-            // The sensor was set to another field of view.
-            self.gap = None;
-        }
+        // Blocks within it: packets were lost, or the sensor was set to another field of view.
+        let is_gap = |gap: &Gap| !gap.holds(self.slots.azimuths_cdeg[0]);
+        (self.gap, self.maybe_gap) = (self.gap.filter(is_gap), self.maybe_gap.filter(is_gap));
         let unknown = self.slots.unknown();
         if unknown > 0 {
             let what = "a block without its flag, or with an azimuth beyond the turn";
