@@ -128,7 +128,7 @@ mod tests {
             assert_eq!(channel["topic"], topic.name());
             let schema = channel["schema"].as_str().unwrap();
             match channel["schemaEncoding"].as_str().unwrap() {
-                "protobuf" => assert_eq!(STANDARD.decode(schema).unwrap(), topic.schema().data),
+                "protobuf" => assert_eq!(STANDARD.decode(schema).unwrap()[..], topic.schema().data[..]),
                 other => assert_eq!((other, schema.starts_with('{')), ("jsonschema", true)),
             }
         }
