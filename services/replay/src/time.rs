@@ -22,7 +22,7 @@ pub(crate) fn is_turn(sensor: &SensorModel, period_ns: u64) -> bool {
 }
 
 /// Puts a stamp [µs since the top of the hour] into the hour of the host's clock, or the one beside it when the result
-/// would be more than half an hour off. Never before 1970.
+/// would be more than half an hour off. Never before 1970, nor after 2262, so that times can be added to.
 pub(crate) fn absolute_ns(host_ns: u64, stamp_us: u64) -> u64 {
     let host = i128::from(host_ns);
     let mut time = host - host % NS_PER_HOUR + i128::from(stamp_us) * 1_000;
@@ -31,7 +31,7 @@ pub(crate) fn absolute_ns(host_ns: u64, stamp_us: u64) -> u64 {
     } else if host - time > NS_PER_HOUR / 2 {
         time += NS_PER_HOUR;
     }
-    u64::try_from(time).unwrap_or(0)
+    u64::try_from(time.min(i128::from(i64::MAX))).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -49,6 +49,7 @@ mod tests {
             (24 * HOUR + minute, 59, 23 * HOUR + 59 * minute),
             (0, 59, 59 * minute),
             (0, 0, 0),
+            (u64::MAX, 5, i64::MAX as u64),
         ] {
             assert_eq!(absolute_ns(host, stamp_min * 60_000_000), expected, "{host} {stamp_min}");
         }

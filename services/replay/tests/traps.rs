@@ -170,6 +170,19 @@ fn lost_packets_leave_unknown_columns_on_the_firing_grid() {
     }
 }
 
+// verifies RPL-012, RPL-020
+#[test]
+fn packets_lost_at_one_place_in_two_turns_are_lost_where_a_turn_between_has_them() {
+    let mut kept = records(0, 4 * TWO_TURNS);
+    // 375 packets are two turns.
+    kept.drain(50 + 750..60 + 750);
+    kept.drain(50..60);
+    let (sweeps, recording) = replayed(&pcap(&kept));
+    assert_eq!(faults(&recording), [(Fault::LostPacket, 20)]);
+    assert_eq!(unknown(&sweeps), 12 * 20);
+    assert!(sweeps[..8].iter().all(|sweep| sweep.header.is_complete()));
+}
+
 // verifies RPL-012
 #[test]
 fn a_gap_of_more_than_half_a_turn_ends_the_sweep_incomplete() {

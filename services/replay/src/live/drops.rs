@@ -21,7 +21,7 @@ impl KernelDrops {
     pub(super) fn of(socket: &UdpSocket) -> Self {
         let is_v6 = socket.local_addr().is_ok_and(|address| address.is_ipv6());
         let inode = rustix::fs::fstat(socket).map_or(0, |stat| stat.st_ino);
-        Self { table: if is_v6 { "/proc/net/udp6" } else { "/proc/net/udp" }, inode, text: Vec::new() }
+        Self { table: if is_v6 { "/proc/net/udp6" } else { "/proc/net/udp" }, inode, text: Vec::with_capacity(1 << 16) }
     }
 
     /// All that were dropped up to now; none where the system does not tell.

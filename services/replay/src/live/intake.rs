@@ -222,7 +222,9 @@ impl Post {
     /// Takes datagrams until it is told to stop, or the socket fails for good.
     fn serve(mut self) {
         let mut bytes = [0; DATAGRAM_BYTES];
-        let (mut errors, mut looked_ns, mut is_new) = (0, 0, true);
+        let (mut errors, mut looked_ns, mut is_new) = (0, 0, false);
+        // The first look takes the memory that all others need.
+        self.count_drops();
         while !self.stop.load(Relaxed) && errors < MAX_ERRORS {
             let received = self.socket.recv_from(&mut bytes);
             let now_ns = (self.wall_ns)();
