@@ -48,20 +48,16 @@ impl Unpacker {
         }
         if !head.is_compressed {
             // The reader trusts lengths of records in chunks that are not compressed.
-            let mut rest = &packed[..packed.len().min(usize::try_from(head.packed).unwrap_or(usize::MAX))];
-            while !rest.is_empty() {
-                match split(rest) {
-                    Some((_, range)) => rest = &rest[range.end..],
-                    None if is_cut => break,
-                    None => return Err("a record goes beyond its chunk".to_owned()),
-                }
+            let held = packed.len().min(usize::try_from(head.packed).unwrap_or(usize::MAX));
+            let mut rest = &packed[..held];
+            while let Some((_, range)) = split(rest) {
+                rest = &rest[range.end..];
             }
-            let whole = packed.len() - rest.len();
-            return self.read(
-                &record[..HEAD_BYTES + head.bytes + if is_cut { whole } else { packed.len() }],
-                is_cut,
-                out,
-            );
+            if !rest.is_empty() && !is_cut {
+                return Err("a record goes beyond its chunk".to_owned());
+            }
+            let used = if is_cut { held - rest.len() } else { packed.len() };
+            return self.read(&record[..HEAD_BYTES + head.bytes + used], is_cut, out);
         }
         self.read(record, is_cut, out)?;
         if !is_cut && (out.len() as u64) < head.unpacked {
