@@ -20,6 +20,7 @@ fn page(folder: &Path, report: &Value) -> String {
     std::fs::read_to_string(out).unwrap()
 }
 
+// verifies GND-010 SUP-014 SUP-015
 #[test]
 fn a_run_has_a_page_that_says_what_its_report_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -61,6 +62,7 @@ fn a_restart_stands_in_the_timeline_at_its_time() {
     assert!(page(folder.path(), &finished.report).contains("restart: classifier (signal 9)"));
 }
 
+// verifies GND-012
 #[test]
 fn what_is_no_report_is_refused_in_one_line_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -123,7 +123,13 @@ pub(crate) fn misses(figures: &RunFigures) -> String {
     let mut causes: Vec<_> = deadline.causes.iter().collect();
     causes.sort_by(|a, b| b.1.cmp(a.1).then(a.0.cmp(b.0)));
     let most = causes.first().map_or(1, |cause| *cause.1).max(1) as f64;
-    let mut text = heading + "<table class=\"plain\">";
+    let kinds = [
+        (BLUE, "late or rejected"),
+        (GREY, "other processes had the core"),
+        (ORANGE, "dropped or lost"),
+        (RED, "restart"),
+    ];
+    let mut text = heading + &key(&kinds, &[]) + "<table class=\"plain\">";
     for (cause, number) in causes {
         let colour = if cause.ends_with("dropped") || cause.ends_with("lost") { ORANGE } else { BLUE };
         let colour = if cause.ends_with("restart") { RED } else { colour };

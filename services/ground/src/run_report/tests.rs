@@ -86,6 +86,7 @@ fn assert_whole(page: &str) {
     }
 }
 
+// verifies GND-010
 #[test]
 fn the_page_shows_what_the_report_says() {
     let page = page(&report());
@@ -222,6 +223,7 @@ fn hostile_words_and_numbers_stay_words_and_numbers() {
     }
 }
 
+// verifies GND-012
 #[test]
 fn what_is_no_report_is_refused_in_one_line_that_says_what_it_is() {
     let whole = report().to_string();
@@ -313,6 +315,7 @@ fn read(bytes: &[u8]) -> Result<RunFigures, RunReportError> {
     recording::read(bytes, "flight.mcap".to_owned())
 }
 
+// verifies GND-011
 #[test]
 fn a_recording_says_what_its_traces_and_detections_say() {
     let sweeps: Vec<_> = [10, 11, 12, 80, 13].into_iter().zip([0, 1, 2, 3, 6]).collect();
