@@ -81,12 +81,18 @@ impl Shown {
 
     /// Asserts that it is drawn as it should be: so many returns, solids, something to be seen, no complaint.
     fn expect_drawn(&self, returns: usize) {
+        self.expect_picture();
+        assert_eq!(self.number("points"), returns as u64);
+        assert!(self.number("solids") > 20, "{:?}", self.data);
+    }
+
+    /// Asserts that there is something to be seen, and no complaint.
+    fn expect_picture(&self) {
         assert_eq!(self.console, [""; 0]);
         assert_eq!(self.data.get("failed"), None);
         assert_eq!(self.data.get("drawn").map(String::as_str), Some("yes"), "{:?}", self.data);
         assert_eq!(self.number("gl"), 0, "an error of WebGL");
-        assert_eq!(self.number("points"), returns as u64);
-        assert!(self.number("solids") > 20 && self.number("clusters") > 20, "{:?}", self.data);
+        assert!(self.number("clusters") > 20, "{:?}", self.data);
         assert!(self.number("lit") > 2_000, "the picture is all but empty: {:?}", self.data);
         assert!(self.dom.contains("<button type=\"button\" aria-label=\"Go to cluster "), "no list");
     }
@@ -185,6 +191,31 @@ fn a_served_page_fetches_what_it_shows() {
     shown.expect_drawn(returns[1]);
     assert_eq!((shown.number("sweep"), shown.number("sweeps")), (1, SWEEPS - 1));
     show(&browser, &format!("{}#sweep=2", url.trim()), &[]).expect_drawn(returns[2]);
+}
+
+#[test]
+fn a_running_chain_is_shown_as_it_runs() {
+    let run = support::Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(3);
+    let mut command = encke();
+    let viewing = command.args(["view", "--live", "--instance", &run.instance]).stdout(Stdio::piped()).spawn();
+    let mut served = Served(viewing.unwrap());
+    let mut url = String::new();
+    BufReader::new(served.0.stdout.take().unwrap()).read_line(&mut url).unwrap();
+    run.wait_for_more(5);
+    if let Some(browser) = chromium() {
+        let shown = show(&browser, url.trim(), &["--virtual-time-budget=3000"]);
+        // Solids only where the chain is not overloaded.
+        shown.expect_picture();
+        assert!(shown.number("points") > 1_000 && shown.number("sweeps") > 1, "{:?}", shown.data);
+        assert!(shown.dom.contains("deadline 100") && !shown.data.contains_key("ended"));
+    }
+    let stopped = encke().args(["ctl", "stop", "--instance", &run.instance]).status().unwrap();
+    assert!(stopped.success());
+    let finished = run.collect(child).expect_code(0);
+    assert_eq!(finished.report["ledger"]["closed"], true);
+    assert!(served.0.wait().unwrap().success(), "the viewer leaves with the chain");
 }
 
 #[test]

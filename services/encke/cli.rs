@@ -150,6 +150,16 @@ Examples:
   encke live                                   then open ws://127.0.0.1:8765 in Foxglove
   encke live --instance flight-1 --port 9000 --wait";
 
+const VIEW_NOTES: &str = "\
+The page needs WebGL 2 and no network; any browser of 2023 or later shows it. A written page holds its sweeps, and leaves
+some out evenly where they would take more than --limit-mb. A served one fetches them as it shows them: for long recordings.
+
+Examples:
+  encke view run.mcap                              writes run.html
+  encke view run.mcap --out page.html --first 100 --sweeps 50 --open
+  encke view run.mcap --serve                      says where; Ctrl-C ends it
+  encke view --live                                the chain that runs, as it runs";
+
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RunArgs {
@@ -481,6 +491,45 @@ pub(crate) struct LiveArgs {
     /// Print where the messages went as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Options of `encke view`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ViewArgs {
+    /// A recording of Encke's: `encke run --record FILE.mcap`.
+    #[arg(value_name = "FILE.mcap", required_unless_present = "live")]
+    pub(crate) file: Option<PathBuf>,
+    /// Serve what a running chain sees instead; it neither waits for that nor knows of it.
+    #[arg(long, conflicts_with_all = ["file", "out", "first", "sweeps", "every", "limit_mb"])]
+    pub(crate) live: bool,
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME", requires = "live")]
+    pub(crate) instance: Option<String>,
+    /// The page. [default: the recording's name with .html]
+    #[arg(long, value_name = "PAGE.html")]
+    pub(crate) out: Option<PathBuf>,
+    /// Serve the page and its sweeps instead, until stopped; only to this machine unless another address is given.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
+    #[arg(conflicts_with_all = ["out", "limit_mb"])]
+    pub(crate) serve: Option<std::net::SocketAddr>,
+    /// Leave out so many sweeps at the start.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) first: usize,
+    /// Look at so many sweeps from there. [default: all]
+    #[arg(long, value_name = "N")]
+    pub(crate) sweeps: Option<usize>,
+    /// Show every K-th of them.
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    pub(crate) every: usize,
+    /// Show at most so many returns of a sweep. [default: all]
+    #[arg(long, value_name = "N")]
+    pub(crate) points: Option<usize>,
+    /// Most that the sweeps in a written page may take [MB].
+    #[arg(long, value_name = "MB", default_value_t = 40)]
+    pub(crate) limit_mb: usize,
+    /// Open it in the browser.
+    #[arg(long)]
+    pub(crate) open: bool,
 }
 
 #[cfg(test)]

@@ -42,6 +42,8 @@ async function play(viewer, on) {
   viewer.playing = on;
   $("play").textContent = on ? "❚❚" : "▶";
   $("play").setAttribute("aria-label", on ? "Pause" : "Play");
+  // A live chain comes by itself; see `watch`.
+  if (viewer.store.about.live) return;
   if (on && viewer.at === viewer.kept.length - 1) await viewer.goTo(0);
   while (viewer.playing && viewer.at < viewer.kept.length - 1) {
     const time = viewer.store.overview.time_ms, [now, next] = [viewer.kept[viewer.at], viewer.kept[viewer.at + 1]];

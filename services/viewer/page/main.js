@@ -38,7 +38,7 @@ class Viewer {
     const { about, overview } = this.store, all = overview.sweep.length;
     document.title = `${about.file ?? "recording"} · Encke`;
     $("file").textContent = about.file ?? "";
-    const parts = [about.source, about.sensor, about.pace && `${about.pace} pace`, counted(all, "sweep")];
+    const parts = [about.source, about.sensor, about.pace && `${about.pace} pace`, about.live ? "live" : counted(all, "sweep")];
     if (about.selected < all) parts.push(`${about.selected} selected`);
     if (this.kept.length < about.selected) parts.push(`${this.kept.length} of them in this page, the others left out evenly to keep it small`);
     $("run").textContent = parts.filter(Boolean).join(" · ");
@@ -76,15 +76,18 @@ class Viewer {
 
   // Shows the sweep at a place among those kept. The latest wish wins.
   async goTo(at) {
+    if (this.kept.length === 0) return;
     this.at = Math.min(Math.max(at, 0), this.kept.length - 1);
     $("slider").value = this.at;
     const wish = this.wish = Symbol("wish");
     try {
-      const sweep = await this.store.sweep(this.kept[this.at]);
+      const place = this.kept[this.at], number = this.store.overview.sweep[place], sweep = await this.store.sweep(place);
       if (wish !== this.wish) return;
       message("");
       const first = !this.sweep;
       this.sweep = sweep;
+      this.number = number;
+      if (this.store.about.live) this.at = Math.max(this.kept.findIndex((kept) => this.store.overview.sweep[kept] === number), 0);
       this.picked = this.picked && again(this.picked, sweep);
       this.hover = null;
       $("tip").hidden = true;
@@ -92,8 +95,17 @@ class Viewer {
       this.refresh();
       for (const near of [this.at + 1, this.at - 1]) if (this.kept[near] !== undefined) this.store.sweep(this.kept[near]).catch(() => {});
     } catch (cause) {
-      message(`Sweep ${this.store.overview.sweep[this.kept[this.at]]} cannot be shown: ${cause.message}`);
+      // A live chain's oldest sweeps go.
+      if (!this.store.about.live) message(`Sweep ${this.store.overview.sweep[this.kept[this.at]]} cannot be shown: ${cause.message}`);
     }
+  }
+
+  // The same sweep, whose place among the others changed.
+  stay(at) {
+    this.at = at;
+    $("slider").value = at;
+    this.plots.at = this.kept[at];
+    if (this.sweep) this.plots.draw();
   }
 
   nearestKept(place) {
@@ -177,14 +189,14 @@ class Viewer {
     scene.draw(view, Number($("size").value) * devicePixelRatio, $("solids").checked);
     const named = $("names").checked ? sweep.clusters.filter((cluster) => cluster.kind > 0 && !this.hidden.has(cluster.kind)) : [];
     this.overlay.draw(scene, view, named, this.picked, this.classes);
-    if (signals.sweep !== String(this.store.overview.sweep[this.kept[this.at]])) this.signal();
+    if (signals.sweep !== String(this.number)) this.signal();
   }
 
   // What a test may ask of the page: it cannot see. Pixels are counted once; that takes time.
   signal() {
     if (!signals.lit) Object.assign(signals, this.scene.checked());
     Object.assign(signals, {
-      sweep: this.store.overview.sweep[this.kept[this.at]], sweeps: this.kept.length, points: this.sweep.count,
+      sweep: this.number, sweeps: this.kept.length, points: this.sweep.count,
       clusters: this.sweep.clusters.length, solids: this.scene.count, drawn: "yes",
     });
   }
@@ -204,6 +216,10 @@ async function main() {
   }
   const viewer = new Viewer(store, scene);
   viewer.resize();
+  if (store.about.live) {
+    play(viewer, true);
+    watch(viewer);
+  }
   const wanted = new URLSearchParams(location.hash.slice(1));
   if ([...$("colour").options].some((option) => option.value === wanted.get("colour"))) $("colour").value = viewer.by = wanted.get("colour");
   $("names").checked = wanted.has("names");

@@ -15,10 +15,18 @@ class Plots {
       canvas.addEventListener("pointermove", (event) => { this.over = place(event); this.draw(); });
       canvas.addEventListener("pointerleave", () => { this.over = null; this.draw(); });
     }
-    const known = store.overview.latency_ms.filter((ms) => ms >= 0).sort();
+    this.at = 0;
+    this.looks = 0;
+    this.look();
+  }
+
+  // Takes up what the store has now.
+  look() {
+    const known = this.store.overview.latency_ms.filter((ms) => ms >= 0).sort();
     this.share = (share) => known[Math.min(known.length - 1, Math.floor(share * known.length))];
     this.known = known.length;
-    this.at = 0;
+    this.looks += 1;
+    this.over = null;
   }
 
   get sweeps() { return this.store.overview.sweep.length; }
@@ -89,7 +97,7 @@ class Plots {
     const most = this.known > 0 ? this.share(1) : 1;
     // The deadline is in the picture where that leaves the latencies readable.
     const highest = deadline && deadline < 4 * most ? Math.max(most, deadline) : most;
-    this.show(this.latency, "", (pen, width, height) => {
+    this.show(this.latency, this.looks, (pen, width, height) => {
       const y = this.axes(pen, width, height, round(Math.max(highest * 1.08, 0.1)), (ms) => `${short(ms)} ms`);
       const each = (width - LEFT - RIGHT) / this.sweeps, crowded = each < 2;
       const wide = Math.max(Math.min(each - 1, 5), crowded ? 1.5 : 1);
@@ -119,7 +127,7 @@ class Plots {
     const kinds = this.classes.filter((kind) => kind.number > 0 && this.shown.has(kind.number));
     const counts = kinds.map((kind) => this.store.overview[kind.name]);
     const sum = (i) => counts.reduce((all, values) => all + values[i], 0);
-    this.show(this.stack, [...this.shown].sort().join(), (pen, width, height) => {
+    this.show(this.stack, [...this.shown].sort().join() + ` ${this.looks}`, (pen, width, height) => {
       let most = 1;
       for (let i = 0; i < this.sweeps; i++) most = Math.max(most, sum(i));
       const y = this.axes(pen, width, height, 2 * Math.ceil(most / 2), (value) => value.toFixed(0));

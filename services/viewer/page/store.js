@@ -11,20 +11,25 @@ class Store {
     this.overview = columnsOf(await inflated(bytesOf(text)));
   }
 
-  // The sweep at a place in the overview; the last few are kept.
+  // The sweep at a place in the overview; the last few are kept, by number.
   sweep(place) {
-    let sweep = this.near.get(place);
-    this.near.delete(place);
-    sweep ??= this.read(place).then(arranged);
-    this.near.set(place, sweep);
+    const number = this.overview.sweep[place];
+    let sweep = this.near.get(number);
+    this.near.delete(number);
+    sweep ??= this.read(number).then(arranged);
+    this.near.set(number, sweep);
     if (this.near.size > 12) this.near.delete(this.near.keys().next().value);
-    sweep.catch(() => this.near.delete(place));
+    sweep.catch(() => this.near.delete(number));
     return sweep;
   }
 
-  async read(place) {
-    if (!this.about.served) return columnsOf(await inflated(bytesOf(document.getElementById(`sweep-${place}`).textContent)));
-    const answer = await fetch(`/sweep/${place}`);
+  async read(number) {
+    if (this.about.served) return this.fetched(`/sweep/${number}`);
+    return columnsOf(await inflated(bytesOf(document.getElementById(`sweep-${number}`).textContent)));
+  }
+
+  async fetched(path) {
+    const answer = await fetch(path);
     if (!answer.ok) throw new Error((await answer.text()).trim() || `the server answered ${answer.status}`);
     return columnsOf(await inflated(new Uint8Array(await answer.arrayBuffer())));
   }

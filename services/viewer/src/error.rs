@@ -67,6 +67,12 @@ pub enum ViewError {
         /// What the system says.
         cause: io::Error,
     },
+    /// A file of the running instance is not there or not what it should be, or signals cannot be had.
+    #[error(transparent)]
+    Shell(#[from] runtime::ShellError),
+    /// Shared memory failed, or all places for viewers are taken.
+    #[error(transparent)]
+    Transport(#[from] transport::TransportError),
     /// No memory for a message.
     #[error("no memory for a message")]
     NoMemory,

@@ -8,8 +8,10 @@ pub(crate) const MAX_HEAD: usize = 8_192;
 pub(crate) enum Wanted {
     /// The page.
     Page,
-    /// The sweep at this place in the recording.
-    Sweep(usize),
+    /// All sweeps in numbers.
+    Overview,
+    /// The sweep of this number.
+    Sweep(u32),
     /// Nothing that there is: the answer's status.
     Refused(Status),
 }
@@ -89,6 +91,9 @@ fn route(target: &str) -> Wanted {
     if target == "/" {
         return Wanted::Page;
     }
+    if target == "/overview" {
+        return Wanted::Overview;
+    }
     let number = target.strip_prefix("/sweep/").filter(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
     number.and_then(|digits| digits.parse().ok()).map_or(Wanted::Refused(Status::NotFound), Wanted::Sweep)
 }
@@ -123,6 +128,7 @@ mod tests {
 
     #[test]
     fn only_the_page_and_sweeps_by_number_are_there() {
+        assert_eq!(wanted("GET /overview"), Wanted::Overview);
         assert_eq!(wanted("GET /"), Wanted::Page);
         assert_eq!(wanted("GET /sweep/12"), Wanted::Sweep(12));
         for path in ["/sweep/", "/sweep/-1", "/sweep/+1", "/sweep/1/..", "/../etc/passwd", "/favicon.ico", "*"] {

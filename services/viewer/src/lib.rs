@@ -2,7 +2,8 @@
 //! machine so that long recordings work.
 //!
 //! [`Recording`] finds what an MCAP file of Encke's holds of each sweep; [`write_page`] puts a [`Selection`] of its sweeps
-//! into one HTML file; [`Server`] hands out the same page and its sweeps one by one. The page draws by itself (`page/`).
+//! into one HTML file; [`Server`] hands out the same page and its sweeps one by one, a recording's or those of a running
+//! chain ([`Live`]). The page draws by itself (`page/`).
 //!
 //! ```
 //! use viewer::Recording;
@@ -14,15 +15,19 @@ mod cloud;
 mod columns;
 mod error;
 mod http;
+mod live;
 mod overview;
 mod page;
 mod recording;
 mod records;
 mod serve;
+mod shelf;
 mod write;
 
 pub use cloud::POINT_UNIT_M;
 pub use error::ViewError;
+pub use live::Live;
 pub use recording::{Recording, Row, Selection};
 pub use serve::Server;
+pub use shelf::{Recorded, Shelf};
 pub use write::{Limits, Written, write_page};

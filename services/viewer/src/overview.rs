@@ -1,15 +1,14 @@
-use crate::Recording;
 use crate::columns::Columns;
+use crate::recording::Row;
 
 /// What sensor times and latencies are rounded to [ms].
 const TIME_UNIT_MS: f64 = 0.1;
 const LATENCY_UNIT_MS: f64 = 0.001;
 
-/// All sweeps of a recording as the page's plots need them: columns `sweep time_ms returns latency_ms step complete` and
+/// All sweeps as the page's plots need them: columns `sweep time_ms returns latency_ms step complete` and
 /// `unclassified rectangular ellipsoidal cylindrical conical`. Times count from the first sweep; a latency that is not known
-/// is −1.
-pub(crate) fn encode(recording: &Recording) -> std::io::Result<Vec<u8>> {
-    let rows = recording.rows();
+/// is −1. With `here`, a column of that name says which of them can be had.
+pub(crate) fn encode(rows: &[Row], here: Option<&[bool]>) -> std::io::Result<Vec<u8>> {
     let first_ns = rows.first().map_or(0, |row| row.sensor_time_ns);
     let mut columns = Columns::default();
     columns.integers("sweep", rows.iter().map(|row| row.sweep as i32));
@@ -23,6 +22,9 @@ pub(crate) fn encode(recording: &Recording) -> std::io::Result<Vec<u8>> {
     let classes = ["unclassified", "rectangular", "ellipsoidal", "cylindrical", "conical"];
     for (class, name) in classes.into_iter().enumerate() {
         columns.integers(name, rows.iter().map(|row| row.classes[class] as i32));
+    }
+    if let Some(here) = here {
+        columns.integers("here", here.iter().map(|&here| here.into()));
     }
     columns.finish()
 }

@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use base64::Engine;
@@ -8,12 +9,12 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::Recording;
+use crate::recording::{Recording, Row};
 
 /// The page's parts, in the order in which they stand in it.
 const FRAME: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/style.css");
-const SCRIPTS: [&str; 14] = [
+const SCRIPTS: [&str; 15] = [
     include_str!("../page/decode.js"),
     include_str!("../page/store.js"),
     include_str!("../page/vector.js"),
@@ -27,6 +28,7 @@ const SCRIPTS: [&str; 14] = [
     include_str!("../page/plots.js"),
     include_str!("../page/list.js"),
     include_str!("../page/controls.js"),
+    include_str!("../page/live.js"),
     include_str!("../page/main.js"),
 ];
 
@@ -37,6 +39,14 @@ const COLOURS: [&str; 5] = ["#56b4e9", "#e69f00", "#009e73", "#d55e00", "#999999
 /// What the page is told beside the sweeps.
 #[derive(Debug)]
 pub(crate) struct About<'a> {
+    /// What it shows: a file's name, or a chain's.
+    pub(crate) title: String,
+    /// What is known of the run, word by word.
+    pub(crate) run: &'a BTreeMap<String, String>,
+    /// What could not be read, in words.
+    pub(crate) damage: &'a [String],
+    /// All sweeps.
+    pub(crate) rows: &'a [Row],
     /// Places of the sweeps that it can show.
     pub(crate) kept: &'a [usize],
     /// Sweeps that were selected; more than are kept where the page would have been too large.
@@ -45,6 +55,26 @@ pub(crate) struct About<'a> {
     pub(crate) most_points: usize,
     /// Whether sweeps are fetched from whoever served the page.
     pub(crate) served: bool,
+    /// Whether there are ever more of them.
+    pub(crate) live: bool,
+}
+
+impl<'a> About<'a> {
+    /// Of a recording's selected sweeps, all of them in the page or all served.
+    pub(crate) fn of(recording: &'a Recording, kept: &'a [usize], most_points: usize, served: bool) -> Self {
+        let name = recording.path().file_name().unwrap_or_default();
+        Self {
+            title: name.to_string_lossy().into_owned(),
+            run: recording.run(),
+            damage: recording.damage(),
+            rows: recording.rows(),
+            kept,
+            selected: kept.len(),
+            most_points,
+            served,
+            live: false,
+        }
+    }
 }
 
 /// What a page may do: run its own script, wear its own style, and (served) fetch from where it came. Nothing else.
@@ -60,7 +90,7 @@ pub(crate) fn policy(served: bool) -> String {
 }
 
 /// Writes the page with these deflated sweeps, in the order of `about.kept`; none where they are served.
-pub(crate) fn write(out: &mut impl Write, recording: &Recording, about: &About, sweeps: &[Vec<u8>]) -> io::Result<()> {
+pub(crate) fn write(out: &mut impl Write, about: &About, sweeps: &[Vec<u8>]) -> io::Result<()> {
     let mut parts = FRAME.split("<!-- part -->");
     let mut frame = |out: &mut dyn Write| out.write_all(parts.next().unwrap_or_default().as_bytes());
     frame(out)?;
@@ -68,10 +98,10 @@ pub(crate) fn write(out: &mut impl Write, recording: &Recording, about: &About, 
     frame(out)?;
     write!(out, "<style>{STYLE}</style>")?;
     frame(out)?;
-    write!(out, "<script type=\"application/json\" id=\"about\">{}</script>", harmless(&told(recording, about)))?;
-    data(out, "overview", &crate::overview::encode(recording)?)?;
+    write!(out, "<script type=\"application/json\" id=\"about\">{}</script>", harmless(&told(about)))?;
+    data(out, "overview", &crate::overview::encode(about.rows, about.live.then_some(&[]))?)?;
     for (place, sweep) in about.kept.iter().zip(sweeps) {
-        data(out, &format!("sweep-{place}"), sweep)?;
+        data(out, &format!("sweep-{}", about.rows[*place].sweep), sweep)?;
     }
     write!(out, "<script>{}</script>", script())?;
     frame(out)
@@ -97,13 +127,12 @@ fn harmless(value: &impl Serialize) -> String {
     text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
-fn told(recording: &Recording, about: &About) -> Value {
-    let run = recording.run();
-    let word = |key: &str| run.get(key).map(String::as_str);
+fn told(about: &About) -> Value {
+    let word = |key: &str| about.run.get(key).map(String::as_str);
     let classes = ObstacleClass::ALL.iter().zip(COLOURS);
-    let first = recording.rows().first();
+    let first = about.rows.first();
     json!({
-        "file": recording.path().file_name().map(|name| name.to_string_lossy()),
+        "file": about.title,
         "version": word("version"),
         "source": word("source"),
         "sensor": word("sensor"),
@@ -112,11 +141,12 @@ fn told(recording: &Recording, about: &About) -> Value {
         "sectors": word("sectors"),
         "deadline_ms": word("deadline_ms").and_then(|text| text.parse::<f64>().ok()),
         "sensor_time_ns": first.map(|row| row.sensor_time_ns.to_string()),
-        "damage": recording.damage(),
+        "damage": about.damage,
         "kept": about.kept,
         "selected": about.selected,
         "most_points": about.most_points,
         "served": about.served,
+        "live": about.live,
         "steps": Step::ALL.map(Step::name),
         "classes": classes.map(|(class, colour)| json!({"number": *class as u8, "name": class.name(), "colour": colour}))
             .collect::<Vec<_>>(),

@@ -184,8 +184,8 @@ impl Recording {
                         let kind = self.channels.get(&header.channel_id);
                         let row = kind.map(|_| found.rows.entry(header.sequence).or_default());
                         let read = match (kind, row) {
-                            (Some(Kind::Sweep), Some(row)) => note_sweep(&data, spot, &mut self.sweep, row),
-                            (Some(Kind::Detections), Some(row)) => note(&data, spot, &mut self.detections, row),
+                            (Some(Kind::Sweep), Some(row)) => read_sweep(&data, spot, &mut self.sweep, row),
+                            (Some(Kind::Detections), Some(row)) => read_found(&data, spot, &mut self.detections, row),
                             _ => Ok(()),
                         };
                         if let Err(cause) = read {
@@ -258,30 +258,40 @@ impl Found {
     }
 }
 
-fn note_sweep(bytes: &[u8], spot: Spot, sweep: &mut Sweep, row: &mut Row) -> Result<(), messages::RawError> {
+fn read_sweep(bytes: &[u8], spot: Spot, sweep: &mut Sweep, row: &mut Row) -> Result<(), messages::RawError> {
     sweep.read_raw(bytes)?;
-    row.sensor_time_ns = sweep.header.sensor_time_ns;
-    row.complete = sweep.header.is_complete();
-    row.returns = sweep.returns.len() as u32;
+    note_sweep(sweep, row);
     row.cloud = Some(spot);
     Ok(())
 }
 
-fn note(bytes: &[u8], spot: Spot, message: &mut Detections, row: &mut Row) -> Result<(), messages::RawError> {
+fn read_found(bytes: &[u8], spot: Spot, found: &mut Detections, row: &mut Row) -> Result<(), messages::RawError> {
     let (trace, bytes) = Trace::read_raw(bytes)?;
-    message.read_raw(bytes)?;
-    if row.cloud.is_none() {
-        row.sensor_time_ns = message.header.sensor_time_ns;
-        row.complete = message.header.is_complete();
+    found.read_raw(bytes)?;
+    note_detections(&trace, found, row.cloud.is_some(), row);
+    row.found = Some(spot);
+    Ok(())
+}
+
+/// Puts down what is known of a whole sweep.
+pub(crate) fn note_sweep(sweep: &Sweep, row: &mut Row) {
+    row.sensor_time_ns = sweep.header.sensor_time_ns;
+    row.complete = sweep.header.is_complete();
+    row.returns = sweep.returns.len() as u32;
+}
+
+/// Puts down what was found in a whole sweep; what the sweep itself says of it where that is not known.
+pub(crate) fn note_detections(trace: &Trace, found: &Detections, has_sweep: bool, row: &mut Row) {
+    if !has_sweep {
+        row.sensor_time_ns = found.header.sensor_time_ns;
+        row.complete = found.header.is_complete();
     }
     row.classes = [0; CLASSES];
-    for detection in &message.detections {
+    for detection in &found.detections {
         row.classes[detection.class as usize] += 1;
     }
     row.latency_ns = trace.hops().last().map(|hop| hop.finished_ns.saturating_sub(trace.due_ns));
     row.step = trace.part.step;
-    row.found = Some(spot);
-    Ok(())
 }
 
 /// The bytes of a message.

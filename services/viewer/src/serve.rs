@@ -5,20 +5,18 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::http::{MAX_HEAD, Request, Status, Wanted, answer};
-use crate::page::{self, About};
+use crate::page;
+use crate::shelf::{Recorded, Shelf};
 use crate::{Limits, Recording, Selection, ViewError};
 
 /// Connections held at a time. One more, and the oldest is dropped: a client that says nothing keeps nobody out.
 const MAX_CLIENTS: usize = 32;
 
-/// Hands out a recording's page and its sweeps over HTTP, on one thread, without a clock.
-pub struct Server {
+/// Hands out a page and its sweeps over HTTP, on one thread, without a clock.
+pub struct Server<S = Recorded> {
     listener: TcpListener,
     address: SocketAddr,
-    recording: Recording,
-    selected: Vec<usize>,
-    limits: Limits,
-    page: Vec<u8>,
+    shelf: S,
     policy: String,
     clients: VecDeque<Client>,
 }
@@ -31,7 +29,7 @@ struct Client {
 }
 
 impl Server {
-    /// Listens; port 0 is any that is free. Nothing is answered before [`Server::turn`].
+    /// Listens for those who want a recording; port 0 is any that is free. Nothing is answered before [`Server::turn`].
     ///
     /// # Errors
     /// Nothing is selected, or the address cannot be listened on.
@@ -41,16 +39,26 @@ impl Server {
         selection: Selection,
         limits: Limits,
     ) -> Result<Self, ViewError> {
-        let selected = recording.select(selection)?;
+        Self::of(address, Recorded::new(recording, selection, limits)?)
+    }
+}
+
+impl<S: Shelf> Server<S> {
+    /// Listens for those who want what is on a shelf.
+    ///
+    /// # Errors
+    /// The address cannot be listened on.
+    pub fn of(address: SocketAddr, shelf: S) -> Result<Self, ViewError> {
         let listen = |cause| ViewError::Listen { address, cause };
         let listener = TcpListener::bind(address).map_err(listen)?;
         listener.set_nonblocking(true).map_err(listen)?;
         let bound = listener.local_addr().map_err(listen)?;
-        let about = About { kept: &selected, selected: selected.len(), most_points: limits.points, served: true };
-        let mut page = Vec::new();
-        page::write(&mut page, &recording, &about, &[]).map_err(ViewError::Write)?;
-        let policy = page::policy(true);
-        Ok(Self { listener, address: bound, recording, selected, limits, page, policy, clients: VecDeque::new() })
+        Ok(Self { listener, address: bound, shelf, policy: page::policy(true), clients: VecDeque::new() })
+    }
+
+    /// What it hands out.
+    pub fn shelf(&mut self) -> &mut S {
+        &mut self.shelf
     }
 
     /// Where it listens.
@@ -142,16 +150,16 @@ impl Server {
     fn answer(&mut self, request: Request) -> Vec<u8> {
         let (text, bare) = ("text/plain; charset=utf-8", "default-src 'none'");
         let refused = |status, said: &str| answer(status, text, bare, said.as_bytes(), request.head_only);
-        match request.wanted {
-            Wanted::Refused(status) => refused(status, "not here\n"),
-            Wanted::Page => answer(Status::Ok, "text/html; charset=utf-8", &self.policy, &self.page, request.head_only),
-            Wanted::Sweep(place) if self.selected.binary_search(&place).is_err() => {
-                refused(Status::NotFound, "not among the sweeps selected\n")
-            }
-            Wanted::Sweep(place) => match self.recording.encoded(place, self.limits.points) {
-                Ok(sweep) => answer(Status::Ok, "application/octet-stream", bare, &sweep, request.head_only),
-                Err(cause) => refused(Status::Failed, &format!("{cause}\n")),
-            },
+        let (kind, policy, found) = match request.wanted {
+            Wanted::Refused(status) => return refused(status, "not here\n"),
+            Wanted::Page => ("text/html; charset=utf-8", self.policy.as_str(), self.shelf.page().map(Some)),
+            Wanted::Overview => ("application/octet-stream", bare, self.shelf.overview().map(Some)),
+            Wanted::Sweep(number) => ("application/octet-stream", bare, self.shelf.sweep(number)),
+        };
+        match found {
+            Ok(Some(body)) => answer(Status::Ok, kind, policy, &body, request.head_only),
+            Ok(None) => refused(Status::NotFound, "no such sweep here\n"),
+            Err(cause) => refused(Status::Failed, &format!("{cause}\n")),
         }
     }
 }

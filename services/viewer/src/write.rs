@@ -61,8 +61,8 @@ pub fn write_page(
             sum = sweeps.iter().map(|sweep: &Vec<u8>| in_page(sweep)).sum();
         }
     }
-    let about = About { kept: &kept, selected: selected.len(), most_points: limits.points, served: false };
-    page::write(out, recording, &about, &sweeps).and_then(|()| out.flush()).map_err(ViewError::Write)?;
+    let about = About { selected: selected.len(), ..About::of(recording, &kept, limits.points, false) };
+    page::write(out, &about, &sweeps).and_then(|()| out.flush()).map_err(ViewError::Write)?;
     Ok(Written { selected: selected.len(), kept: kept.len(), sweep_bytes: sum })
 }
 
