@@ -1,6 +1,6 @@
 // Two plots over all sweeps of the recording: latency with its deadline, and obstacles by class. A click goes to the sweep.
 
-const LEFT = 40, RIGHT = 8, TOP = 6, LOW = 16;
+const LEFT = 46, RIGHT = 8, TOP = 6, LOW = 16;
 
 class Plots {
   constructor(store, classes, jump) {
@@ -125,13 +125,15 @@ class Plots {
 
   drawStack() {
     const kinds = this.classes.filter((kind) => kind.number > 0 && this.shown.has(kind.number));
-    const counts = kinds.map((kind) => this.store.overview[kind.name]);
+    const { overview, about } = this.store, { step } = overview, counts = kinds.map((kind) => overview[kind.name]);
     const sum = (i) => counts.reduce((all, values) => all + values[i], 0);
     this.show(this.stack, [...this.shown].sort().join() + ` ${this.looks}`, (pen, width, height) => {
       let most = 1;
       for (let i = 0; i < this.sweeps; i++) most = Math.max(most, sum(i));
       const y = this.axes(pen, width, height, 2 * Math.ceil(most / 2), (value) => value.toFixed(0));
-      const wide = Math.max((width - LEFT - RIGHT) / this.sweeps * 0.86, 1);
+      const each = (width - LEFT - RIGHT) / this.sweeps, wide = Math.max(each * 0.86, 1);
+      pen.fillStyle = "#f0c67426";
+      for (let i = 0; i < this.sweeps; i++) if (step[i] > 0) pen.fillRect(this.x(i, width) - each / 2, TOP, each, height - TOP - LOW);
       for (let i = 0; i < this.sweeps; i++) {
         let low = 0;
         kinds.forEach((kind, k) => {
@@ -143,7 +145,8 @@ class Plots {
     });
     const place = this.over ?? this.at;
     const here = kinds.map((kind, k) => `${counts[k][place]} ${kind.name}`).join(", ");
-    document.getElementById("classes-said").textContent = `· ${sum(place)} in sweep ${this.store.overview.sweep[place]}`;
+    document.getElementById("classes-said").textContent =
+      `· ${sum(place)} in sweep ${overview.sweep[place]}${step[place] > 0 ? ` · overload (shaded): ${about.steps[step[place]] ?? step[place]}` : ""}`;
     this.stack.setAttribute("aria-label", `Obstacles by class over time. Sweep ${this.store.overview.sweep[place]}: ${here}`);
   }
 }

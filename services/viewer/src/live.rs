@@ -52,7 +52,7 @@ impl Live {
         let node = Node::visit(instance, "view", plan.chain.queue_parts())?;
         let paced = plan.pace == Pace::Realtime;
         let mut run = BTreeMap::from([
-            ("source".to_owned(), plan.source.from.display().to_string()),
+            ("source".to_owned(), plan.source.from.file_name().unwrap_or_default().to_string_lossy().into_owned()),
             ("pace".to_owned(), if paced { "realtime" } else { "fast" }.to_owned()),
         ]);
         if paced {
