@@ -7,6 +7,9 @@ use super::records::{HEAD_BYTES, MAX_BYTES, split};
 /// Most that zstd can make of a byte: a block of 128 KiB of four.
 const MAX_RATIO: u64 = 32_768;
 
+/// Packed bytes that the reader is given at once [bytes]: what stays in the cache.
+const PIECE_BYTES: usize = 1 << 16;
+
 /// Unpacks chunks; the decompressors' memory is used again.
 #[derive(Default)]
 pub(super) struct Unpacker {
@@ -81,10 +84,11 @@ impl Unpacker {
         loop {
             match reader.next_event() {
                 Some(Ok(LinearReadEvent::ReadRequest(_))) if rest.is_empty() => break,
-                Some(Ok(LinearReadEvent::ReadRequest(_))) => {
-                    reader.insert(rest.len())[..rest.len()].copy_from_slice(rest);
-                    reader.notify_read(rest.len());
-                    rest = &[];
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
+                    let (piece, after) = rest.split_at(rest.len().min(wanted.max(PIECE_BYTES)));
+                    reader.insert(piece.len())[..piece.len()].copy_from_slice(piece);
+                    reader.notify_read(piece.len());
+                    rest = after;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
                     out.push(opcode);

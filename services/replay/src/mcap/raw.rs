@@ -98,17 +98,12 @@ fn check(sweep: &Sweep) -> Result<(), String> {
     if floats.iter().any(|&value| !(value.is_finite() && value >= 0.0)) {
         return fails("a length or angle of the header is negative or not finite");
     }
-    if sweep.returns.iter().any(|found| !found.position().iter().all(|c| c.is_finite())) {
-        return fails("a return is not finite");
-    }
+    let is_finite = |found: &Return| found.position().iter().all(|c| c.is_finite());
     if !header.is_organised() {
-        let is_plain = |found: &Return| found.column == 0 && found.ring == 0;
+        let is_plain = |found: &Return| found.column == 0 && found.ring == 0 && is_finite(found);
         let is_empty = sweep.columns.is_empty() && sweep.rings.is_empty();
-        return if is_empty && sweep.returns.iter().all(is_plain) {
-            Ok(())
-        } else {
-            fails("an unorganised cloud has columns")
-        };
+        let what = "an unorganised cloud has columns, or a return is not finite";
+        return if is_empty && sweep.returns.iter().all(is_plain) { Ok(()) } else { fails(what) };
     }
     let azimuths = -std::f32::consts::PI..std::f32::consts::PI;
     if sweep.columns.iter().any(|column| column.valid > 1 || !azimuths.contains(&column.azimuth_rad))
@@ -121,12 +116,14 @@ fn check(sweep: &Sweep) -> Result<(), String> {
     {
         return fails("rings do not rise");
     }
+    let mut before = 0;
     let is_placed = |found: &Return| {
-        usize::from(found.ring) < sweep.rings.len()
-            && sweep.columns.get(usize::from(found.column)).is_some_and(|column| column.valid == 1)
+        let is_valid = sweep.columns.get(usize::from(found.column)).is_some_and(|column| column.valid == 1);
+        let is_next = std::mem::replace(&mut before, found.column) <= found.column;
+        is_finite(found) && is_valid && is_next && usize::from(found.ring) < sweep.rings.len()
     };
-    if !sweep.returns.iter().all(is_placed) || sweep.returns.windows(2).any(|pair| pair[0].column > pair[1].column) {
-        return fails("returns do not lie in their columns and rings, in firing order");
+    if !sweep.returns.iter().all(is_placed) {
+        return fails("returns are not finite, or do not lie in their columns and rings, in firing order");
     }
     Ok(())
 }
