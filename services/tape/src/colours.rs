@@ -1,7 +1,8 @@
 //! One colour a class, the same wherever obstacles are shown.
 //!
-//! From the palette of Okabe and Ito (Color Universal Design, 2008), whose colours stay apart for all kinds of colour
-//! vision; those that are bright enough for a dark ground.
+//! From the palette of Okabe and Ito (Color Universal Design, 2008), those that are bright enough for a dark ground, and
+//! a light grey. Seen without one of the three kinds of cones (model of Machado et al. 2009, full severity), the nearest
+//! two are still 16 apart in CIELAB (sky blue and bluish green, tritanopia; 18 and more otherwise).
 
 use lidar::ObstacleClass;
 
@@ -14,7 +15,7 @@ pub const CYLINDRICAL: [u8; 3] = [0, 158, 115];
 /// Vermilion: cones.
 pub const CONICAL: [u8; 3] = [213, 94, 0];
 /// Grey: no class.
-pub const UNCLASSIFIED: [u8; 3] = [153, 153, 153];
+pub const UNCLASSIFIED: [u8; 3] = [190, 190, 190];
 
 /// The colour of a class: red, green, blue, 0 to 255.
 pub const fn colour(class: ObstacleClass) -> [u8; 3] {
