@@ -50,7 +50,6 @@ pub(crate) fn be_nice() {
 
 /// Lets this thread run only when no other wants the core. The kernel grants that to everybody.
 pub(crate) fn be_idle() {
-    be_nice();
     let _ = set_scheduler(Pid::current_thread(), Scheduler::SCHED_IDLE, SchedulerParams { priority: 0 });
 }
 

@@ -12,6 +12,9 @@ use super::protocol::{self, FromClient, TOPICS};
 /// Most subscriptions of a client.
 const MAX_SUBSCRIPTIONS: usize = 64;
 
+/// Most messages of a client that are read in one turn: none may keep the others waiting.
+const MAX_READ: usize = 64;
+
 /// One viewer. Its socket never blocks; what it does not take is not sent, and counted.
 pub(super) struct Client {
     socket: WebSocket<TcpStream>,
@@ -90,7 +93,7 @@ impl Client {
 
     /// Reads what it asks for and gives it what the socket takes, without waiting.
     pub(super) fn turn(&mut self) {
-        while !self.gone {
+        for _ in 0..MAX_READ {
             match self.socket.read() {
                 Ok(Message::Text(text)) => self.answer(&text),
                 Ok(_) => {}

@@ -19,7 +19,7 @@ use transport::Instance;
 use crate::MonitorError;
 use crate::attached::Attached;
 use crate::events::Events;
-use crate::process::be_idle;
+use crate::process::{be_idle, be_nice};
 use crate::sample::Sample;
 use crate::top::EventView;
 pub use account::{Account, TopicAccount};
@@ -59,8 +59,10 @@ pub trait Supervisor {
 /// # Errors
 /// The instance cannot be attached to, the address cannot be listened on, or standard output fails.
 pub fn live(instance: &Instance, settings: &Settings, supervisor: &impl Supervisor) -> Result<(), MonitorError> {
-    be_idle();
+    be_nice();
     let mut live = Live::begin(instance, settings)?;
+    // Only now: whoever is told the address finds somebody there.
+    be_idle();
     let address = live.server.address();
     let url =
         format!("ws://{address}\nIn Foxglove: Open connection, Foxglove WebSocket, this address. Ctrl-C ends it.\n");

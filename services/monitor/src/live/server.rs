@@ -20,8 +20,8 @@ use crate::MonitorError;
 const MAX_CLIENTS: usize = 8;
 /// Most connections that have not shaken hands yet.
 const MAX_GUESTS: usize = 8;
-/// Looks after which a connection that has not shaken hands is closed: seconds.
-const GUEST_LOOKS: u32 = 250;
+/// Turns within which a connection must have shaken hands: five seconds where nothing else happens.
+const GUEST_TURNS: u32 = 250;
 /// Longest message of a client [bytes].
 const MAX_MESSAGE: usize = 64 * 1024;
 
@@ -119,7 +119,7 @@ impl Server {
             PollFd::from_borrowed_fd(client.stream().as_fd(), PollFlags::IN | writes)
         }));
         let patience = Timespec { tv_sec: 0, tv_nsec: patience_ns.min(999_999_999) as _ };
-        // A signal, or no memory to wait in: the caller looks at everything and comes back.
+        // A signal, or no memory to wait in: the caller turns at everything and comes back.
         let _ = poll(&mut sockets, Some(&patience));
     }
 
@@ -135,8 +135,8 @@ impl Server {
                 self.account.refused += 1;
             }
         }
-        for (guest, looks) in std::mem::take(&mut self.guests) {
-            self.welcome(guest.handshake(), looks + 1);
+        for (guest, turns) in std::mem::take(&mut self.guests) {
+            self.welcome(guest.handshake(), turns + 1);
         }
         self.clients.iter_mut().for_each(Client::turn);
         let (gone, here) = std::mem::take(&mut self.clients).into_iter().partition(Client::is_gone);
@@ -147,14 +147,14 @@ impl Server {
     fn welcome(
         &mut self,
         shaken: Result<WebSocket<TcpStream>, HandshakeError<ServerHandshake<TcpStream, Check>>>,
-        looks: u32,
+        turns: u32,
     ) {
         match shaken {
             Ok(socket) if self.clients.len() < MAX_CLIENTS => {
                 self.account.clients += 1;
                 self.clients.push(Client::new(socket, &self.first));
             }
-            Err(HandshakeError::Interrupted(guest)) if looks < GUEST_LOOKS => self.guests.push((guest, looks)),
+            Err(HandshakeError::Interrupted(guest)) if turns < GUEST_TURNS => self.guests.push((guest, turns)),
             _ => self.account.refused += 1,
         }
     }
