@@ -40,7 +40,7 @@ fn table(figures: &RunFigures) -> String {
         }
         text += &format!("<td>{says}</td></tr>");
     }
-    text + "</table></div>"
+    if text.ends_with("</th></tr>") { String::new() } else { text + "</table></div>" }
 }
 
 /// Share of longer ones against latency: (1 / share, latency).

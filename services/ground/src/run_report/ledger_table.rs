@@ -111,7 +111,13 @@ pub(crate) fn misses(figures: &RunFigures) -> String {
         return heading
             + &absent("At pace <code>fast</code> nothing is due at any time: there are no deadlines to miss.");
     }
-    let Some(deadline) = &figures.deadline else { return heading + &absent("This report says nothing of deadlines.") };
+    let Some(deadline) = &figures.deadline else {
+        return heading
+            + &absent(match figures.recording {
+                Some(_) => "The recording does not say what deadline the run had.",
+                None => "This report says nothing of deadlines.",
+            });
+    };
     if deadline.misses == 0 {
         return heading
             + &format!(

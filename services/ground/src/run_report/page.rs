@@ -11,7 +11,7 @@ const MORE_STYLE: &str = "\
 p,figcaption{max-width:60em}.key{font:13px/1.5 sans-serif;margin:10px 0 2px;display:flex;flex-wrap:wrap;gap:2px 16px;max-width:none}\
 .key span{white-space:nowrap}.key svg{display:inline-block;vertical-align:-2px;margin-right:5px}\
 .verdict{border-left:6px solid;padding:8px 14px;margin:14px 0;background:#f4f4f2}.verdict.fine{border-color:#009E73}\
-.verdict.fair{border-color:#E69F00}.verdict.bad{border-color:#D55E00}.sign{font:700 18px sans-serif;margin-right:4px}\
+.verdict.fair{border-color:#E69F00}.verdict.bad{border-color:#D55E00}.verdict.unknown{border-color:#8A8A8A}.sign{font:700 18px sans-serif;margin-right:4px}\
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(116px,1fr));gap:8px;margin:14px 0 4px;font-family:sans-serif}\
 .tiles div{border:1px solid #ddd;padding:8px 10px}.note{font-size:14px}.tiles b{display:block;font-size:21px;font-weight:600}.tiles span{font-size:12px;line-height:1.3;display:block;color:#555}\
 .absent{color:#555;font-style:italic;border:1px dashed #bbb;padding:8px 12px}.good{font-family:sans-serif}\

@@ -360,7 +360,10 @@ fn a_recording_in_sectors_has_no_obstacle_latencies_and_one_without_pace_no_dead
     let found = read(&recorded(&sweeps, "realtime")).unwrap();
     assert_eq!((found.sectors, found.latency_ms.end_to_end.count, found.obstacle_latency_ms), (4, 2, None));
     let found = read(&recorded(&sweeps, "fast")).unwrap();
-    assert_eq!((found.deadline, found.pace.as_str()), (None, "fast"));
+    assert_eq!((&found.deadline, found.pace.as_str()), (&None, "fast"));
+    expect(&found.to_html(), &["verdict unknown", "without deadlines"]);
+    let found = RunFigures { pace: String::new(), ..found };
+    expect(&found.to_html(), &["It does not say what deadline the run had."]);
 }
 
 #[test]

@@ -23,13 +23,18 @@ fn class(figures: &RunFigures) -> &'static str {
         return "bad";
     }
     let misses = figures.deadline.as_ref().map_or(0, |deadline| deadline.misses);
-    if misses + missing(figures).unwrap_or(0) > 0 { "fair" } else { "fine" }
+    if misses + missing(figures).unwrap_or(0) > 0 {
+        return "fair";
+    }
+    // Without a ledger and a deadline nothing can be said to be well.
+    if figures.ledger.is_none() && figures.deadline.is_none() { "unknown" } else { "fine" }
 }
 
 fn words(figures: &RunFigures) -> String {
     let sign = match class(figures) {
         "bad" => "✗",
         "fair" => "!",
+        "unknown" => "?",
         _ => "✓",
     };
     let mut says = vec![format!("<span class=\"sign\">{sign}</span>")];
@@ -72,7 +77,10 @@ fn deadline(figures: &RunFigures) -> String {
         return "The run was as fast as it goes, without deadlines.".to_owned();
     }
     let (Some(deadline), Some(limit_ms)) = (&figures.deadline, deadline_ms(figures)) else {
-        return "Nothing is said of deadlines.".to_owned();
+        return match figures.recording {
+            Some(_) => "It does not say what deadline the run had.".to_owned(),
+            None => "Nothing is said of deadlines.".to_owned(),
+        };
     };
     let limit = plain(limit_ms);
     let share = deadline.margin_p999_pct.map_or(String::new(), |margin| {
