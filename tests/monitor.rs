@@ -43,8 +43,8 @@ fn live(run: &Run) -> (Child, String) {
     let mut out = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
     out.read_line(&mut line).unwrap();
-    // The rest is the account at its end.
-    drop(std::thread::spawn(move || std::io::copy(&mut out, &mut std::io::sink())));
+    // Open until its end: the account still comes.
+    child.stdout = Some(out.into_inner());
     (child, line.trim().to_owned())
 }
 

@@ -9,6 +9,11 @@ use tungstenite::{Message, WebSocket, connect};
 use super::protocol::{SUBPROTOCOLS, place};
 use super::server::Server;
 
+/// Another thread for a client, which blocks.
+fn aside<T: Send + 'static>(what: impl FnOnce() -> T + Send + 'static) -> JoinHandle<T> {
+    thread::Builder::new().spawn(what).unwrap()
+}
+
 type Viewer = WebSocket<MaybeTlsStream<TcpStream>>;
 
 fn sut() -> Server {
@@ -27,7 +32,7 @@ fn serve<T>(server: &mut Server, other: JoinHandle<T>) -> T {
 
 fn connecting(server: &Server, protocol: &'static str) -> JoinHandle<Result<Viewer, Box<tungstenite::Error>>> {
     let address = format!("ws://{}", server.address());
-    thread::spawn(move || {
+    aside(move || {
         let mut request = address.into_client_request().unwrap();
         request.headers_mut().insert("sec-websocket-protocol", protocol.parse().unwrap());
         Ok(connect(request).map_err(Box::new)?.0)
@@ -71,7 +76,7 @@ fn a_viewer_is_told_what_there_is_and_gets_what_it_asked_for() {
         true
     });
     sut.offer(Topic::Sweep, 42, |_| panic!("nobody asked for it"));
-    let reading = thread::spawn(move || [(); 3].map(|()| viewer.read().unwrap()));
+    let reading = aside(move || [(); 3].map(|()| viewer.read().unwrap()));
     let [info, channels, data] = serve(&mut sut, reading);
     assert!(info.to_text().unwrap().contains("encke sut"));
     assert!(channels.to_text().unwrap().contains("/encke/detections"));
@@ -116,7 +121,7 @@ fn a_viewer_that_reads_again_gets_what_comes_then() {
     let mut sut = sut();
     let mut viewer = viewer(&mut sut, Topic::Sweep);
     offer(&mut sut, Topic::Sweep, 100);
-    let reading = thread::spawn(move || {
+    let reading = aside(move || {
         loop {
             let data = viewer.read().unwrap().into_data();
             if data.len() < 100 && data.first() == Some(&1) {
@@ -159,7 +164,7 @@ fn another_life_of_the_chain_is_another_session() {
     let mut sut = sut();
     let mut viewer = viewer(&mut sut, Topic::Sweep);
     sut.renew("encke sut", "2");
-    let reading = thread::spawn(move || [(); 4].map(|()| viewer.read().unwrap()));
+    let reading = aside(move || [(); 4].map(|()| viewer.read().unwrap()));
     let [before, _, after, _] = serve(&mut sut, reading);
     assert!(before.to_text().unwrap().contains(r#""sessionId":"1""#));
     assert!(after.to_text().unwrap().contains(r#""sessionId":"2""#));
