@@ -63,7 +63,7 @@ pub fn replayed(bytes: &[u8], format: Option<Format>) {
             sweep.clear();
             match recording.next(sweep, &mut bench.truth) {
                 Ok(Next::Sweep) => check(sweep),
-                Ok(Next::End) | Err(_) => return,
+                Ok(Next::End | Next::Nothing) | Err(_) => return,
             }
         }
     });

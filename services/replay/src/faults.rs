@@ -33,7 +33,8 @@ pub enum Fault {
     BadChunk,
     /// A message that is not what its channel says; it is passed over.
     BadMessage,
-    /// The time of a sweep goes back, or on by more than one and a half turns; it is given as it is.
+    /// The time of a sweep goes back, or on by more than one and a half turns, or between two packets by some milliseconds;
+    /// it is given as it is.
     ClockStep,
     /// A value of intensity outside 0 to 255, clamped.
     Intensity,
@@ -43,8 +44,6 @@ pub enum Fault {
     BadFile,
     /// A file of a folder that is no recording.
     OtherFile,
-    /// The sensor's clock was set forward by a few milliseconds: the sweep goes on.
-    ClockStep,
     /// A datagram to a live sensor's port that is no data packet by its length.
     OtherLength,
     /// A datagram of a sender that is not accepted.
@@ -59,7 +58,7 @@ pub enum Fault {
 
 impl Fault {
     /// All kinds.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 23] = [
         Self::TornCapture,
         Self::BadFrame,
         Self::NoBlock,
@@ -78,7 +77,6 @@ impl Fault {
         Self::UnknownColumn,
         Self::BadFile,
         Self::OtherFile,
-        Self::ClockStep,
         Self::OtherLength,
         Self::OtherSender,
         Self::OtherProduct,
@@ -107,7 +105,6 @@ impl Fault {
             Self::UnknownColumn => "unknown_column",
             Self::BadFile => "bad_file",
             Self::OtherFile => "other_file",
-            Self::ClockStep => "clock_step",
             Self::OtherLength => "other_length",
             Self::OtherSender => "other_sender",
             Self::OtherProduct => "other_product",

@@ -15,13 +15,17 @@ pub enum Format {
     Pcd,
     /// nuScenes `LIDAR_TOP`: five floats a return, one sweep a file.
     NuScenes,
-    /// Velodyne data packets in an MCAP file.
+    /// Polygon file format, one sweep a file.
+    Ply,
+    /// KITTI: four floats a return, one sweep a file.
+    Kitti,
+    /// Messages of Encke and of others in one container.
     Mcap,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 5] = [Self::Pcap, Self::Csv, Self::Pcd, Self::NuScenes, Self::Mcap];
+    pub const ALL: [Self; 7] = [Self::Pcap, Self::Csv, Self::Pcd, Self::NuScenes, Self::Ply, Self::Kitti, Self::Mcap];
 
     /// The format's word on the command line and in reports.
     pub const fn name(self) -> &'static str {
@@ -30,6 +34,8 @@ impl Format {
             Self::Csv => "csv",
             Self::Pcd => "pcd",
             Self::NuScenes => "nuscenes",
+            Self::Ply => "ply",
+            Self::Kitti => "kitti",
             Self::Mcap => "mcap",
         }
     }
@@ -39,8 +45,10 @@ impl Format {
         // Those with a mark of their own come first.
         if capture::is_capture(head) {
             Some(Self::Pcap)
-        } else if capture::mcap::is_mcap(head) {
+        } else if mcap::is_mcap(head) {
             Some(Self::Mcap)
+        } else if cloud::ply::is_ply(head) {
+            Some(Self::Ply)
         } else if cloud::pcd::is_pcd(head) {
             Some(Self::Pcd)
         } else if cloud::csv::is_csv(head) {

@@ -19,6 +19,7 @@ mod files;
 mod format;
 mod intake;
 mod live;
+mod mcap;
 mod recording;
 mod table;
 mod time;

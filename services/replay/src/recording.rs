@@ -5,23 +5,22 @@ use messages::{Sweep, Truth};
 use stage::{Next, Source, SourceError};
 
 use crate::capture::{self, Capture};
-use crate::cloud::files::Clouds;
+use crate::cloud::files::CloudFiles;
+use crate::cloud::sweeps::Clouds;
 use crate::error::ReplayError;
 use crate::faults::Faults;
 use crate::files;
 use crate::format::Format;
 use crate::intake::Limits;
+use crate::mcap::{Kind, MessageClouds, Messages, RawSweeps};
 use crate::velodyne::{Probe, Progress, Sweeps};
-
-/// The sensor of every format that does not say it, where the caller does not either.
-pub(crate) const DEFAULT_SENSOR: &str = "hdl-32e";
 
 /// What the caller may say of a recording. Everything else is found in it.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The format, where its content does not tell or a folder holds several.
     pub format: Option<Format>,
-    /// Name of the sensor model; that of the packets' factory byte if none, else `hdl-32e`.
+    /// Name of the sensor model; if none, that of the packets' factory byte, `hdl-64e` for KITTI, and `hdl-32e` elsewhere.
     pub sensor: Option<String>,
     /// The topic of an MCAP file to read, where it has several that hold sweeps.
     pub topic: Option<String>,
@@ -68,7 +67,7 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
     let (files, format) = files::find(path, options.format, &mut faults)?;
     let packets = open_packets(&files, format)?;
     let found = packets.as_ref().and_then(|(_, probe)| probe.sensor());
-    let name = options.sensor.as_deref().or(found).unwrap_or(DEFAULT_SENSOR);
+    let name = options.sensor.as_deref().or(found).unwrap_or(format.sensor());
     let sensor = sensors(name).map_err(|source| ReplayError::Sensor { name: name.to_owned(), source })?;
     let [near_m, far_m] = sensor.accepted_range_m();
     let near_m = options.min_range_m.or(format.near_m()).unwrap_or(near_m);
@@ -80,7 +79,7 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
             sweeps.look_for_gap()?;
             Reader::Packets(Box::new(sweeps))
         }
-        Format::Mcap => {
+        None if format == Format::Mcap => {
             let messages = Messages::open(files, options.topic.as_deref())?;
             match messages.kind() {
                 Kind::Raw => {
@@ -96,7 +95,7 @@ pub fn open(path: &Path, options: &Options, sensors: SensorLookup<'_>) -> Result
                 }
             }
         }
-        Format::Csv | Format::Pcd | Format::NuScenes | Format::Ply | Format::Kitti => {
+        None => {
             let source = Box::new(CloudFiles::new(files, format));
             Reader::Clouds(Box::new(Clouds::new(source, &sensor, limits, &mut faults)?))
         }
@@ -117,10 +116,6 @@ fn open_packets(files: &[PathBuf], format: Format) -> Result<Option<(Capture, Pr
     let mut capture = match format {
         Format::Pcap => Capture::pcap(files.to_vec()),
         Format::Mcap if has_packets(files)? => Capture::mcap(files.to_vec()),
-        Format::Mcap => {
-            let what = "holds no velodyne_msgs/msg/VelodyneScan".to_owned();
-            return Err(ReplayError::Empty { path: files.first().cloned().unwrap_or_default(), what });
-        }
         _ => return Ok(None),
     };
     let probe = Probe::of(&mut capture)?;

@@ -28,7 +28,7 @@ fn main() {
     live(&std::fs::read(&capture).unwrap());
 }
 
-// verifies RPL-023
+// verifies RPL-029
 fn live(capture: &[u8]) {
     let address = "udp://127.0.0.1:0".parse().unwrap();
     let mut live = replay::listen(&address, &replay::Options::default(), &support::sensors, || 1).unwrap();

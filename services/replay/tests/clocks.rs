@@ -32,7 +32,7 @@ fn set(by_us: i64) -> Vec<Sent> {
     sent
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn a_sensor_clock_set_forward_by_milliseconds_costs_nothing() {
     let (whole, _) = replayed(&sent());
@@ -52,7 +52,7 @@ fn a_sensor_clock_set_forward_by_milliseconds_costs_nothing() {
     assert_eq!((faults(&recording), columns(&sweeps)), (vec![], (12 * PACKETS, 0)));
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn a_sensor_clock_set_back_or_far_ahead_ends_the_sweep_and_costs_a_packet() {
     // Within 10 ms back a packet could also be late; that the head goes on tells them apart.
@@ -67,7 +67,7 @@ fn a_sensor_clock_set_back_or_far_ahead_ends_the_sweep_and_costs_a_packet() {
     }
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn the_hosts_clock_may_be_set_by_an_hour_while_the_sensor_goes_on() {
     let (whole, _) = replayed(&sent());
@@ -85,7 +85,7 @@ fn the_hosts_clock_may_be_set_by_an_hour_while_the_sensor_goes_on() {
     }
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn time_rises_over_the_hour_and_over_midnight() {
     let day_us = 24 * HOUR_US;
@@ -100,7 +100,7 @@ fn time_rises_over_the_hour_and_over_midnight() {
     }
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn a_sensor_without_a_clock_from_outside_counts_on_from_its_start() {
     // Stamps from 0 on, while the host is in the middle of its hour.
@@ -112,7 +112,7 @@ fn a_sensor_without_a_clock_from_outside_counts_on_from_its_start() {
     assert_eq!(starts_ns(&sweeps)[0], 100 * HOUR_US * 1_000);
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn a_stream_recorded_twice_is_one_and_late_packets_of_it_are_left_out() {
     let (whole, _) = replayed(&sent());
@@ -132,7 +132,7 @@ fn a_stream_recorded_twice_is_one_and_late_packets_of_it_are_left_out() {
     }
 }
 
-// verifies RPL-024
+// verifies RPL-030
 #[test]
 fn a_recording_that_was_stopped_for_hours_goes_on_at_its_own_time() {
     let (first, mut second) = (sent(), sent());

@@ -111,7 +111,7 @@ fn a_mode_makes_no_difference_to_columns_and_their_times() {
     }
 }
 
-// verifies RPL-019
+// verifies RPL-025
 #[test]
 fn the_factory_byte_names_the_sensor_where_the_caller_does_not() {
     for sensor in SENSORS {

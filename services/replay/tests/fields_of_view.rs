@@ -25,7 +25,7 @@ fn inner(sweeps: &[Box<Sweep>]) -> &[Box<Sweep>] {
     &sweeps[1..sweeps.len() - 1]
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn each_sweep_is_the_field_of_view_wherever_it_lies_and_however_wide_it_is() {
     let views = [
@@ -65,7 +65,7 @@ fn each_sweep_is_the_field_of_view_wherever_it_lies_and_however_wide_it_is() {
     }
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn packets_lost_beside_the_gap_leave_unknown_columns_and_none_within_it() {
     let sent = head("vlp-32c", [27_000.0, 9_000.0]).plain(TURN * 6);
@@ -87,7 +87,7 @@ fn packets_lost_beside_the_gap_leave_unknown_columns_and_none_within_it() {
     }
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn a_sensor_set_to_another_field_of_view_shows_it_within_a_turn() {
     let whole_turns = Head::new("vlp-32c", 0x37);
@@ -108,7 +108,7 @@ fn a_sensor_set_to_another_field_of_view_shows_it_within_a_turn() {
     assert_eq!((last.columns.len(), last.header.is_complete()), (TURN / 2, false));
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn a_torn_azimuth_is_no_field_of_view() {
     let sent = Head::new("vlp-32c", 0x37).plain(TURN * 4);
@@ -124,7 +124,7 @@ fn a_torn_azimuth_is_no_field_of_view() {
     }
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn both_returns_of_half_a_turn_are_cut_there_too() {
     let head = Head { view_cdeg: [27_000.0, 9_000.0], ..Head::new("vlp-32c", 0x39) };

@@ -77,7 +77,7 @@ fn received(live: &mut Live, datagrams: &[Vec<u8>]) -> Vec<Box<Sweep>> {
     sweeps
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn packets_over_a_socket_give_the_captures_sweeps_to_the_bit() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -95,7 +95,7 @@ fn packets_over_a_socket_give_the_captures_sweeps_to_the_bit() {
     }
 }
 
-// verifies RPL-023
+// verifies RPL-029
 #[test]
 fn of_a_burst_every_packet_is_accounted_for() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -128,7 +128,7 @@ fn of_a_burst_every_packet_is_accounted_for() {
     assert_eq!(live.faults().count(Fault::KernelDrop), traffic.kernel_drops());
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn a_silent_sensor_gives_nothing_and_what_it_began_comes_out_incomplete() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -151,7 +151,7 @@ fn a_silent_sensor_gives_nothing_and_what_it_began_comes_out_incomplete() {
     assert_eq!(live.faults().found().collect::<Vec<_>>(), []);
 }
 
-// verifies RPL-023
+// verifies RPL-029
 #[test]
 fn what_is_not_the_sensors_data_is_counted_by_reason_and_left_out() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -172,7 +172,7 @@ fn what_is_not_the_sensors_data_is_counted_by_reason_and_left_out() {
     assert_eq!(live.faults().found().collect::<Vec<_>>(), [(Fault::OtherSender, 8)]);
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn a_socket_of_all_addresses_takes_only_the_sender_named() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -192,7 +192,7 @@ fn a_socket_of_all_addresses_takes_only_the_sender_named() {
     assert_eq!(live.faults().found().collect::<Vec<_>>(), [(Fault::OtherSender, 5)]);
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn ipv6_is_listened_to_where_the_machine_has_it() {
     let Some(capture) = data(CAPTURE) else { return };
@@ -218,7 +218,7 @@ fn received_only(live: &mut Live) -> Vec<Box<Sweep>> {
     sweeps
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn a_field_of_view_shows_itself_over_a_socket_too() {
     let Some(mcap) = data("mcap/vlp32c_velodynescan.mcap") else { return };
@@ -237,7 +237,7 @@ fn a_field_of_view_shows_itself_over_a_socket_too() {
     assert_eq!(returns, 131_305);
 }
 
-// verifies RPL-022
+// verifies RPL-028
 #[test]
 fn a_port_that_is_taken_is_refused_in_one_line() {
     let live = on_loopback();
@@ -276,7 +276,7 @@ fn hostile() -> impl Strategy<Value = Vec<Vec<u8>>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
 
-    // verifies RPL-023
+    // verifies RPL-029
     #[test]
     fn no_datagrams_break_it(datagrams in hostile()) {
         let mut live = on_loopback();

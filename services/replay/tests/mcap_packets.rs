@@ -130,7 +130,7 @@ fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
     found
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn every_compression_and_both_encodings_give_the_same_sweeps() {
     let (expected, recording) = replayed(&plain()).unwrap();
@@ -153,7 +153,7 @@ fn every_compression_and_both_encodings_give_the_same_sweeps() {
     }
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn other_topics_are_passed_over_and_of_two_sensors_the_first_is_read() {
     let others = [("/imu", "sensor_msgs/msg/Imu"), ("/rear/packets", SCHEMA)];
@@ -161,7 +161,7 @@ fn other_topics_are_passed_over_and_of_two_sensors_the_first_is_read() {
     assert_eq!((received(&sweeps), faults(&recording)), (ALL_COLUMNS, vec![]));
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn a_file_without_packets_is_refused_in_one_line() {
     let bytes = written(options(None), "sensor_msgs/msg/Imu", false, &[]);
@@ -169,7 +169,7 @@ fn a_file_without_packets_is_refused_in_one_line() {
     assert!(error.contains("x.mcap: ") && !error.contains('\n'), "{error}");
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn a_chunk_with_a_wrong_checksum_is_left_out_and_named() {
     let whole = plain();
@@ -189,7 +189,7 @@ fn a_chunk_with_a_wrong_checksum_is_left_out_and_named() {
     }
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn a_file_torn_anywhere_is_used_up_to_there() {
     for compression in [Some(Compression::Zstd), None] {
@@ -212,7 +212,7 @@ fn a_file_torn_anywhere_is_used_up_to_there() {
     }
 }
 
-// verifies RPL-021
+// verifies RPL-027
 #[test]
 fn lengths_beyond_all_bounds_are_harmless() {
     let whole = plain();

@@ -19,7 +19,7 @@ fn xs(path: &Path) -> Vec<f32> {
     all(&mut opened(path).unwrap()).iter().map(|sweep| sweep.returns[0].x).collect()
 }
 
-// verifies RPL-025
+// verifies RPL-031
 #[test]
 fn a_pattern_stands_for_the_files_that_match_it_in_name_order() {
     let folder = tempfile::tempdir().unwrap();
@@ -37,7 +37,7 @@ fn a_pattern_stands_for_the_files_that_match_it_in_name_order() {
     assert_eq!(matched(&at("?.csv")).unwrap(), [at("a.csv"), at("b.csv")]);
 }
 
-// verifies RPL-025
+// verifies RPL-031
 #[test]
 fn a_path_that_exists_is_no_pattern() {
     let folder = tempfile::tempdir().unwrap();
@@ -50,7 +50,7 @@ fn a_path_that_exists_is_no_pattern() {
     assert_eq!(xs(&folder.path().join("*")), [3.0], "a folder of that name");
 }
 
-// verifies RPL-025, RPL-016
+// verifies RPL-031, RPL-016
 #[test]
 fn a_pattern_that_nothing_matches_or_that_is_none_is_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -64,7 +64,7 @@ fn a_pattern_that_nothing_matches_or_that_is_none_is_one_line() {
     }
 }
 
-// verifies RPL-025
+// verifies RPL-031
 #[test]
 fn formats_are_told_within_a_pattern_as_within_a_folder() {
     let folder = tempfile::tempdir().unwrap();

@@ -27,7 +27,7 @@ fn degrees(sweep: &Sweep, column: usize) -> f64 {
     -f64::from(sweep.columns[column].azimuth_rad).to_degrees()
 }
 
-// verifies RPL-019, RPL-021
+// verifies RPL-025, RPL-027
 #[test]
 fn every_return_of_the_messages_is_there_once() {
     let Some((sweeps, facts)) = recorded() else { return };
@@ -39,7 +39,7 @@ fn every_return_of_the_messages_is_there_once() {
     assert!(sweeps.iter().flat_map(|sweep| sweep.columns.iter()).all(|column| column.valid == 1));
 }
 
-// verifies RPL-020
+// verifies RPL-026
 #[test]
 fn sweeps_are_cut_at_the_gap_of_the_field_of_view_and_not_at_the_wrap_within_it() {
     let Some((sweeps, facts)) = recorded() else { return };
@@ -70,7 +70,7 @@ fn sweeps_are_cut_at_the_gap_of_the_field_of_view_and_not_at_the_wrap_within_it(
     }
 }
 
-// verifies RPL-019
+// verifies RPL-025
 #[test]
 fn returns_stray_from_their_columns_by_no_more_than_lasers_look_aside() {
     let Some((sweeps, _)) = recorded() else { return };
@@ -91,7 +91,7 @@ fn points(pcd: &[u8]) -> Vec<[f32; 3]> {
     pcd[start..].chunks_exact(12).map(|row| [number(&row[..4]), number(&row[4..8]), number(&row[8..])]).collect()
 }
 
-// verifies RPL-019
+// verifies RPL-025
 #[test]
 fn the_first_message_is_another_decoders_cloud_in_the_same_order() {
     let Some((sweeps, facts)) = recorded() else { return };
@@ -136,7 +136,7 @@ fn the_first_message_is_another_decoders_cloud_in_the_same_order() {
     }
 }
 
-// verifies RPL-019
+// verifies RPL-025
 #[test]
 fn the_sensor_file_is_the_manuals_table() {
     let sensor = sensors("vlp-32c").unwrap();

@@ -22,8 +22,9 @@ pub use intake::Traffic;
 use crate::capture::Capture;
 use crate::error::{Place, ReplayError};
 use crate::faults::{Fault, Faults};
+use crate::format::Format;
 use crate::intake::Limits;
-use crate::recording::{DEFAULT_SENSOR, Options, SensorLookup};
+use crate::recording::{Options, SensorLookup};
 use crate::velodyne::{Progress, Sweeps};
 
 /// Sweeps of a live sensor.
@@ -65,7 +66,7 @@ pub fn listen(
     sensors: SensorLookup<'_>,
     wall_ns: fn() -> u64,
 ) -> Result<Live, ReplayError> {
-    let name = options.sensor.as_deref().unwrap_or(DEFAULT_SENSOR);
+    let name = options.sensor.as_deref().unwrap_or(Format::Pcap.sensor());
     let sensor = sensors(name).map_err(|source| ReplayError::Sensor { name: name.to_owned(), source })?;
     let [near_m, far_m] = sensor.accepted_range_m();
     let limits = Limits::checked(options.min_range_m.unwrap_or(near_m), options.max_range_m.unwrap_or(far_m))?;

@@ -17,6 +17,10 @@ const HEAD_BYTES: usize = 22;
 pub(crate) struct Message<'a> {
     /// Time at which it was logged [ns].
     pub(crate) log_time_ns: u64,
+    /// Number that its sender gave it.
+    pub(crate) sequence: u32,
+    /// Its file goes on with the run of one before it, whose last messages it may hold again.
+    pub(crate) goes_on: bool,
     pub(crate) data: &'a [u8],
 }
 
@@ -94,7 +98,8 @@ impl Messages {
         self.offset = found.offset;
         let data = self.records.as_ref()?.data(&found);
         let log_time_ns = u64::from_le_bytes(data.get(6..14)?.try_into().ok()?);
-        Some(Message { log_time_ns, data: data.get(HEAD_BYTES..)? })
+        let sequence = u32::from_le_bytes(data.get(2..6)?.try_into().ok()?);
+        Some(Message { log_time_ns, sequence, goes_on: self.channels.goes_on(), data: data.get(HEAD_BYTES..)? })
     }
 }
 

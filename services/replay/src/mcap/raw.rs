@@ -1,5 +1,7 @@
 //! Encke's own sweeps, to the bit.
 
+use std::collections::VecDeque;
+
 use lidar::Return;
 use messages::{Message as _, Raw, Sweep};
 use zerocopy::FromZeros;
@@ -16,12 +18,17 @@ pub(crate) struct RawSweeps {
     limits: Option<Limits>,
     /// Start and duration of the sweep before [ns].
     before_ns: Option<(u64, u64)>,
+    /// Number and start of the latest sweeps.
+    latest: VecDeque<(u32, u64)>,
 }
+
+/// Sweeps that a file may hold again of the one before: those that were on their way when its writer died.
+const MOST_AGAIN: usize = 512;
 
 impl RawSweeps {
     /// Sees that there is at least one sweep.
     pub(crate) fn new(messages: Messages, limits: Option<Limits>) -> Result<Self, ReplayError> {
-        let mut sut = Self { messages, limits, before_ns: None };
+        let mut sut = Self { messages, limits, before_ns: None, latest: VecDeque::with_capacity(MOST_AGAIN) };
         let empty = |what: String, sut: &Self| ReplayError::Empty { path: sut.messages.place().0.to_owned(), what };
         let Ok(mut sweep) = Sweep::new_box_zeroed() else {
             return Err(empty("cannot be read without memory for a sweep".to_owned(), &sut));
@@ -37,6 +44,7 @@ impl RawSweeps {
     pub(crate) fn rewind(&mut self) {
         self.messages.rewind();
         self.before_ns = None;
+        self.latest.clear();
     }
 
     /// Fills `sweep` with the next one; false after the last.
@@ -44,9 +52,20 @@ impl RawSweeps {
         loop {
             let Some(message) = self.messages.next(faults) else { return false };
             sweep.clear();
+            let (sequence, goes_on) = (message.sequence, message.goes_on);
             let read = sweep.read_raw(message.data).map_err(|error| error.to_string());
             match read.and_then(|()| check(sweep)) {
-                Ok(()) => break,
+                Ok(()) => {
+                    let this = (sequence, sweep.header.sensor_time_ns);
+                    if goes_on && self.latest.contains(&this) {
+                        continue;
+                    }
+                    if self.latest.len() == MOST_AGAIN {
+                        self.latest.pop_front();
+                    }
+                    self.latest.push_back(this);
+                    break;
+                }
                 Err(what) => {
                     let (path, place) = self.messages.place();
                     faults.note(Fault::BadMessage, 1, path, place, what);

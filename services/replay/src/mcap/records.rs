@@ -148,7 +148,7 @@ impl Records {
         }
         let here = at + HEAD_BYTES as u64;
         let is_cut = length > self.length.saturating_sub(here);
-        let is_read = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
+        let is_read = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::METADATA);
         let cut = || format!("the file ends inside a record of {length} bytes");
         if !is_read || length > MAX_BYTES {
             if is_cut {

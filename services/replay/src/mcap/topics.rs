@@ -66,11 +66,16 @@ impl Fields<'_> {
     }
 }
 
+/// Name of the metadata of Encke's own recordings, and the key under which the number of the file in its run stands.
+const RUN: &str = "encke.run";
+const PART: &str = "part";
+
 /// Channels by their number, as a file introduces them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Channels {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
+    goes_on: bool,
 }
 
 impl Channels {
@@ -85,6 +90,10 @@ impl Channels {
                 false
             }
             op::CHANNEL => self.learn_channel(fields).is_some(),
+            op::METADATA => {
+                self.learn_run(fields);
+                false
+            }
             _ => false,
         }
     }
@@ -97,6 +106,27 @@ impl Channels {
         let what = format!("{schema} in {encoding}");
         self.channels.insert(id, Channel { topic, kind, what });
         Some(())
+    }
+
+    /// What Encke's own recordings say of their run.
+    fn learn_run(&mut self, mut fields: Fields<'_>) -> Option<()> {
+        if fields.string()? != RUN {
+            return None;
+        }
+        // The length of the map in bytes.
+        let (_, rest) = fields.0.split_first_chunk::<4>()?;
+        fields.0 = rest;
+        loop {
+            let (key, value) = (fields.string()?, fields.string()?);
+            if key == PART {
+                self.goes_on = value != "0";
+            }
+        }
+    }
+
+    /// Whether the file goes on with the run of one before it, whose last sweeps it may hold again.
+    pub(super) fn goes_on(&self) -> bool {
+        self.goes_on
     }
 
     /// Whether the messages of channel `id` are those of `choice`.
