@@ -20,7 +20,7 @@ const ZSTD_LEVEL: u32 = 1;
 const METADATA: &str = "encke.run";
 
 /// What each file says of its run.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
     /// Of the executable.
     pub version: String,
@@ -34,6 +34,8 @@ pub struct About {
     pub pace: String,
     /// Name of the chain's instance.
     pub instance: String,
+    /// Longest allowed time from a sweep's last return to its detections [ms]; none where no clock paces the sweeps.
+    pub deadline_ms: Option<f64>,
 }
 
 /// A file that is being written. Bytes leave with [`Reel::commit`]; after an error nothing more is written.
@@ -188,7 +190,7 @@ pub(crate) struct Stamps {
 }
 
 fn metadata(about: &About, number: u64) -> Metadata {
-    let pairs = [
+    let mut pairs = vec![
         ("version", about.version.clone()),
         ("source", about.source.clone()),
         ("sensor", about.sensor.clone()),
@@ -197,7 +199,8 @@ fn metadata(about: &About, number: u64) -> Metadata {
         ("instance", about.instance.clone()),
         ("part", number.to_string()),
     ];
-    Metadata { name: METADATA.into(), metadata: pairs.map(|(key, value)| (key.into(), value)).into() }
+    pairs.extend(about.deadline_ms.map(|deadline_ms| ("deadline_ms", deadline_ms.to_string())));
+    Metadata { name: METADATA.into(), metadata: pairs.into_iter().map(|(key, value)| (key.into(), value)).collect() }
 }
 
 fn unwrapped(error: McapError) -> io::Error {

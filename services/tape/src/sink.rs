@@ -5,7 +5,8 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes that are gathered before they are written; larger pieces are written as they come.
+/// Bytes that are gathered before they are written, and that are written at once: while the kernel copies them nobody else
+/// may have the core, where it cannot be preempted.
 const GATHERED: usize = 64 * 1024;
 
 /// What takes the bytes.
@@ -84,8 +85,10 @@ impl Write for Sink {
         if bytes.len() < GATHERED {
             self.gathered.extend_from_slice(bytes);
         } else {
-            let written = self.target.write_all(bytes);
-            self.checked(written)?;
+            for piece in bytes.chunks(GATHERED) {
+                let written = self.target.write_all(piece);
+                self.checked(written)?;
+            }
         }
         self.meter.position.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         Ok(bytes.len())

@@ -34,7 +34,7 @@ const SCRIPTS: [&str; 15] = [
 
 /// Colours of the classes in the order of `ObstacleClass::ALL`: those of Okabe and Ito that are told apart by all eyes and
 /// stand out on dark ground; a recording's other views have the same.
-const COLOURS: [&str; 5] = ["#56b4e9", "#e69f00", "#009e73", "#d55e00", "#999999"];
+const COLOURS: [&str; 5] = ["#56b4e9", "#e69f00", "#009e73", "#d55e00", "#bebebe"];
 
 /// What the page is told beside the sweeps.
 #[derive(Debug)]

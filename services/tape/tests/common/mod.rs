@@ -161,6 +161,7 @@ pub fn about(sectors: u32) -> About {
         sectors,
         pace: "fast".into(),
         instance: "i".into(),
+        deadline_ms: None,
     }
 }
 
