@@ -23,6 +23,7 @@
 //!     lossless: true,
 //!     in_order_from: None,
 //!     paced: false,
+//!     rate: 1.0,
 //!     deadline_ms: 100.0,
 //!     stages: vec!["simulator".into(), "clusterer".into(), "extractor".into(), "classifier".into()],
 //! };
@@ -48,7 +49,6 @@ mod detections_json;
 mod history;
 mod labels_csv;
 mod latency;
-mod order;
 mod output;
 mod over_time;
 mod part_rows;

@@ -146,7 +146,8 @@ mod tests {
             ..BucketSnapshot::default()
         };
         let buckets = vec![bucket(2, 5_000_000), BucketSnapshot::default(), bucket(1, 9_000_000)];
-        let timeline = TimelineSnapshot { begin_ns: 10_000_000_000, bucket_ns: 250_000_000, buckets };
+        let timeline =
+            TimelineSnapshot { begin_ns: 10_000_000_000, first_ns: 10_000_000_000, bucket_ns: 250_000_000, buckets };
         let report = SweepTimeline::of(&timeline, &["source", "clusterer"], 10_100_000_000);
         let times: Vec<f64> = report.latency_ms.iter().map(|bucket| bucket.t_s).collect();
         assert_eq!((report.bucket_s, times), (0.25, vec![-0.1, 0.4]));

@@ -4,10 +4,9 @@ use std::sync::atomic::Ordering;
 use std::thread::{Builder, JoinHandle};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use messages::{Detections, Trace, Verdict};
+use messages::{Detections, Order, Place, Trace, Verdict};
 use stage::{Settled, Sink, SinkError};
 
-use crate::order::{Order, Place};
 use crate::output::{Commit, Failure, Output};
 use crate::part_rows::{PartRows, is_coherent};
 use crate::repair::Whole;

@@ -31,6 +31,8 @@ pub struct Settings {
     /// Whether a sensor's clock (or its simulation) paces the sweeps. Without it a return has no time at which it
     /// should have been there: obstacle latencies and deadline misses are then not counted.
     pub paced: bool,
+    /// Seconds of sensor time in a second of host time, above 0: 1 where a sensor's own clock paces the sweeps.
+    pub rate: f64,
     /// Longest allowed time from a sweep's last return to its detections [ms], positive.
     pub deadline_ms: f64,
     /// Names of the stages by position in the chain, the source first; 1 to [`MAX_HOPS`].
@@ -135,6 +137,7 @@ mod tests {
             lossless: false,
             in_order_from: None,
             paced: true,
+            rate: 1.0,
             deadline_ms: 100.0,
             stages: vec!["simulator".into()],
         }

@@ -18,6 +18,7 @@ use crate::worst::Worst;
 /// Statistics of one life of the recorder.
 pub(crate) struct Statistics {
     paced: bool,
+    rate: f64,
     deadline_ms: f64,
     stages: Vec<StageStatistics>,
     /// The recorder's own verdicts.
@@ -58,6 +59,7 @@ impl Statistics {
     pub(crate) fn new(settings: &Settings) -> Result<Self, CreationError> {
         Ok(Self {
             paced: settings.paced,
+            rate: settings.rate,
             deadline_ms: settings.deadline_ms,
             stages: settings.stages.iter().map(|name| StageStatistics::new(name)).collect::<Result<_, _>>()?,
             verdicts: Verdicts::default(),
@@ -138,7 +140,7 @@ impl Statistics {
         if !self.paced {
             return Answer { end_to_end_ns, missed: None };
         }
-        self.answers.add(trace.part.sweep, end_to_end_ns, self.period_ns);
+        self.answers.add(trace.part.sweep, end_to_end_ns, self.host_ns(self.period_ns));
         let missed = (end_to_end_ns as f64 > self.deadline_ms * 1e6).then_some(cause);
         if let Some(Cause { stage, kind }) = missed {
             self.misses += 1;
@@ -174,11 +176,17 @@ impl Statistics {
             self.detections[detection.class as usize] += 1;
             let Some(sent_ns) = sent_ns else { continue };
             if detection.summary.points as usize >= MIN_FEATURE_POINTS {
-                let last_return_ns = trace.sweep_start_ns.saturating_add(detection.summary.last_offset_ns.into());
+                let offset_ns = self.host_ns(detection.summary.last_offset_ns.into());
+                let last_return_ns = trace.sweep_start_ns.saturating_add(offset_ns);
                 let latency = if detection.summary.seam == 0 { &mut self.obstacle } else { &mut self.seam };
                 latency.record(sent_ns.saturating_sub(last_return_ns));
             }
         }
+    }
+
+    /// Host time that a stretch of sensor time takes [ns].
+    fn host_ns(&self, sensor_ns: u64) -> u64 {
+        if self.rate == 1.0 { sensor_ns } else { (sensor_ns as f64 / self.rate) as u64 }
     }
 
     fn stage_names(&self) -> Vec<&str> {

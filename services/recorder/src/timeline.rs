@@ -93,16 +93,21 @@ fn middle_ns(bin: usize) -> u64 {
 }
 
 /// The timeline of one life.
-pub(crate) struct Timeline(Buckets<Bucket>);
+pub(crate) struct Timeline {
+    buckets: Buckets<Bucket>,
+    /// Host time of the first part [ns]; none before it.
+    first_ns: Option<u64>,
+}
 
 impl Timeline {
     pub(crate) fn new() -> Self {
-        Self(Buckets::new(WIDTH_NS, MOST))
+        Self { buckets: Buckets::new(WIDTH_NS, MOST), first_ns: None }
     }
 
     /// Notes at host time `at_ns` what a part added to the counts, and its sweep's last part if that was an answer.
     pub(crate) fn note(&mut self, at_ns: u64, before: &Counts, after: &Counts, answer: Option<&Segments>) {
-        let bucket = self.0.at(at_ns);
+        self.first_ns.get_or_insert(at_ns);
+        let bucket = self.buckets.at(at_ns);
         bucket.misses += after.misses - before.misses;
         bucket.missing += after.missing - before.missing;
         for (place, sum) in bucket.detections.iter_mut().enumerate() {
@@ -120,9 +125,10 @@ impl Timeline {
     }
 
     pub(crate) fn snapshot_into(&self, snapshot: &mut TimelineSnapshot, stages: usize) {
-        snapshot.bucket_ns = self.0.width_ns();
+        snapshot.bucket_ns = self.buckets.width_ns();
+        snapshot.first_ns = self.first_ns.unwrap_or(0);
         snapshot.buckets.clear();
-        for (begin_ns, bucket) in self.0.iter() {
+        for (begin_ns, bucket) in self.buckets.iter() {
             if snapshot.buckets.is_empty() {
                 snapshot.begin_ns = begin_ns;
             }
@@ -176,6 +182,8 @@ impl Bucket {
 pub struct TimelineSnapshot {
     /// Host time at which the first bucket begins [ns].
     pub begin_ns: u64,
+    /// Host time of the first part [ns]: sweeps that are missing before it are found then.
+    pub first_ns: u64,
     /// Length of a bucket [ns].
     pub bucket_ns: u64,
     /// The buckets in order.
@@ -252,13 +260,14 @@ impl TimelineSnapshot {
             return;
         }
         let mut both = Timeline::new();
+        both.first_ns = Some(if self.buckets.is_empty() { later.first_ns } else { self.first_ns });
         for snapshot in [&*self, later] {
-            both.0.coarsen_to(snapshot.bucket_ns);
+            both.buckets.coarsen_to(snapshot.bucket_ns);
             for (begin_ns, bucket) in snapshot.iter() {
-                both.0.at(begin_ns).merge(&Bucket::of(bucket));
+                both.buckets.at(begin_ns).merge(&Bucket::of(bucket));
             }
         }
-        both.0.at(later.begin_ns).missing += missing;
+        both.buckets.at(later.first_ns).missing += missing;
         both.snapshot_into(self, stages);
     }
 }

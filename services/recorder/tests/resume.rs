@@ -90,8 +90,7 @@ fn labels_torn_at_any_byte_are_cut_to_the_sweep_before() {
     }
 }
 
-// verifies REC-006
-// verifies REC-022
+// verifies REC-023
 #[test]
 fn what_is_in_the_files_is_not_written_again() {
     let folder = memory_folder();
@@ -109,6 +108,7 @@ fn what_is_in_the_files_is_not_written_again() {
     assert_eq!(read(folder.path()), files(0..4));
 }
 
+// verifies REC-006
 #[test]
 fn labels_alone_lose_no_whole_sweep() {
     let folder = memory_folder();

@@ -67,9 +67,38 @@ pub struct RunFigures {
     pub latency_histogram_ms: Option<Histograms>,
     /// How all this went over time.
     pub timeline: Option<Timeline>,
-    /// Only of a recording: what is said of the file itself.
+    /// What the run recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub recording: Option<Recording>,
+    pub recording: Option<Recorded>,
+    /// Only of figures that are worked out from a recording: what is said of the file itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub read_from: Option<Recording>,
+}
+
+/// See `supervisor::RecordingReport`.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
+pub struct Recorded {
+    /// The first file.
+    pub file: String,
+    /// Messages by topic.
+    pub topics: Vec<RecordedTopic>,
+    /// Files that were begun.
+    pub files: u64,
+    /// Bytes of all files.
+    pub bytes: u64,
+}
+
+/// Messages of a topic.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
+pub struct RecordedTopic {
+    /// Its name.
+    pub topic: String,
+    /// Messages that are there.
+    pub messages: u64,
+    /// Messages that are not.
+    pub lost: u64,
 }
 
 /// See `supervisor::LedgerReport`.

@@ -18,7 +18,7 @@ const GAPS: usize = 20;
 pub(crate) fn section(figures: &RunFigures) -> String {
     let heading = "<h2>Ledger</h2>".to_owned();
     let Some(ledger) = &figures.ledger else {
-        let Some(recording) = &figures.recording else { return heading + &absent("This report has no ledger.") };
+        let Some(recording) = &figures.read_from else { return heading + &absent("This report has no ledger.") };
         return heading + &statuses(recording);
     };
     let most = ledger.hops.iter().map(|hop| hop.published).max().unwrap_or(0).max(1) as f64;
@@ -113,7 +113,7 @@ pub(crate) fn misses(figures: &RunFigures) -> String {
     }
     let Some(deadline) = &figures.deadline else {
         return heading
-            + &absent(match figures.recording {
+            + &absent(match figures.read_from {
                 Some(_) => "The recording does not say what deadline the run had.",
                 None => "This report says nothing of deadlines.",
             });

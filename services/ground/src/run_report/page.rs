@@ -1,6 +1,6 @@
 //! The page: what stands where.
 
-use super::figures::RunFigures;
+use super::figures::{Recorded, RunFigures};
 use super::parts::count;
 use super::plot::plain;
 use super::{budget_plots, detection_plots, latency_plots, ledger_table, tables, usage_plots, verdict, worst_plot};
@@ -87,7 +87,14 @@ impl RunFigures {
         if !self.machine.is_empty() {
             rows.push(("Machine", escaped(&self.machine)));
         }
-        if let Some(recording) = &self.recording {
+        if let Some(Recorded { file, topics, files, bytes }) = &self.recording {
+            let (messages, lost) = topics.iter().fold((0, 0), |(all, lost), of| (all + of.messages, lost + of.lost));
+            let mib = *bytes as f64 / f64::from(1 << 20);
+            let (messages, lost) = (count(messages), count(lost));
+            let what = format!("{}: {messages} messages, {lost} lost; {files} files, {mib:.1} MiB", escaped(file));
+            rows.push(("Recording", what));
+        }
+        if let Some(recording) = &self.read_from {
             rows.push(("Recording", escaped(&recording.file)));
             if let Some([first, last]) = &recording.written_utc {
                 rows.push(("Written", format!("{} to {} UTC", escaped(first), escaped(last))));

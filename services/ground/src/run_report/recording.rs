@@ -165,7 +165,7 @@ impl Reading {
             timeline.events = self.events.into_iter().map(event).collect();
             timeline.event_count = self.event_count;
         }
-        figures.recording = Some(Recording {
+        figures.read_from = Some(Recording {
             file,
             written_utc: self.utc_ns.map(|(first, last)| [utc(first), utc(last)]),
             messages: self.messages,

@@ -12,7 +12,7 @@ pub(crate) fn processes(figures: &RunFigures) -> String {
     let heading = "<h2>Processes</h2>".to_owned();
     let Some(processes) = figures.processes.as_ref().filter(|processes| !processes.is_empty()) else {
         return heading
-            + &absent(match figures.recording {
+            + &absent(match figures.read_from {
                 Some(_) => "A recording does not say what the processes used.",
                 None => "This report does not say what the processes used.",
             });

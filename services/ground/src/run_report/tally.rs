@@ -42,7 +42,9 @@ impl Tally {
             resume: false,
             queue_parts: 1,
             lossless: true,
+            in_order_from: None,
             paced,
+            rate: 1.0,
             deadline_ms: deadline_ms.unwrap_or(NEVER_MS),
             stages: STAGES.map(str::to_owned).to_vec(),
         };

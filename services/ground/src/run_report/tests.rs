@@ -336,7 +336,7 @@ fn a_recording_says_what_its_traces_and_detections_say() {
     // The first answer came 110 ms after the first firing; the event half a second after it.
     assert_eq!(timeline.events[0].kind, "restart");
     assert!((timeline.events[0].t_s - 0.61).abs() < 1e-6);
-    let recording = found.recording.as_ref().unwrap();
+    let recording = found.read_from.as_ref().unwrap();
     let [first, last] = recording.written_utc.clone().unwrap();
     assert_eq!((first.as_str(), last.as_str()), ("2026-11-22 12:00:00", "2026-11-22 12:00:00"));
     assert_eq!((recording.unread, &recording.torn, recording.messages["/encke/raw/detections"]), (0, &None, 5));
@@ -374,7 +374,7 @@ fn a_torn_recording_is_used_up_to_the_tear_and_never_a_panic() {
     for length in (0..whole.len()).step_by(97) {
         match read(&whole[..length]) {
             Ok(found) => {
-                assert!(found.recording.as_ref().unwrap().torn.is_some(), "{length}");
+                assert!(found.read_from.as_ref().unwrap().torn.is_some(), "{length}");
                 assert!(found.sweeps <= 20);
                 used = used.max(found.sweeps);
             }
@@ -400,7 +400,7 @@ fn a_sweep_that_cannot_be_read_and_one_that_was_rejected_are_told() {
     stale.write_raw(&mut rejected);
     Detections::new_box_zeroed().unwrap().write_raw(&mut rejected);
     let found = read(&recorded(&[sweep(0, 10, 1), short, rejected, sweep(3, 10, 1)], "realtime")).unwrap();
-    assert_eq!(found.recording.as_ref().unwrap().unread, 1);
+    assert_eq!(found.read_from.as_ref().unwrap().unread, 1);
     let causes = [("clusterer stale".to_owned(), 1), ("not in the recording".to_owned(), 1)];
     assert_eq!(found.deadline.as_ref().unwrap().causes, causes.into());
     expect(&found.to_html(), &["1 sweeps"]);

@@ -9,7 +9,7 @@ pub(crate) fn section(figures: &RunFigures) -> String {
     let heading = "<h2>Processor and memory</h2>".to_owned();
     let Some(timeline) = figures.timeline.as_ref().filter(|timeline| !timeline.processes.is_empty()) else {
         return heading
-            + &absent(match figures.recording {
+            + &absent(match figures.read_from {
                 Some(_) => "A recording does not say what the processes used.",
                 None => "This report is of an older version: it has no timeline of the processes.",
             });

@@ -41,7 +41,7 @@ fn words(figures: &RunFigures) -> String {
     match &figures.ledger {
         Some(ledger) if ledger.closed => says.push("The ledger is closed: every part has its place.".to_owned()),
         Some(_) => says.push("<b>The ledger is OPEN</b>: parts are in no category, or in two.".to_owned()),
-        None if figures.recording.is_some() => says.push("Figures worked out from a recording.".to_owned()),
+        None if figures.read_from.is_some() => says.push("Figures worked out from a recording.".to_owned()),
         None => says.push("The report has no ledger.".to_owned()),
     }
     match missing(figures) {
@@ -58,7 +58,7 @@ fn words(figures: &RunFigures) -> String {
             }
             (None, None) => says.push("Exit code 0, with <code>--strict</code> as well.".to_owned()),
         },
-        None if figures.recording.is_none() => {
+        None if figures.read_from.is_none() => {
             says.push("The report is of an older version and does not say how the command ended.".to_owned());
         }
         None => {}
@@ -66,7 +66,7 @@ fn words(figures: &RunFigures) -> String {
     if let Some(why) = figures.stopped.as_ref().filter(|_| figures.verdict.is_none()) {
         says.push(format!("It was stopped: {}.", escaped(why)));
     }
-    if let Some(torn) = figures.recording.as_ref().and_then(|recording| recording.torn.as_ref()) {
+    if let Some(torn) = figures.read_from.as_ref().and_then(|recording| recording.torn.as_ref()) {
         says.push(format!("The file is not whole: {}.", escaped(torn)));
     }
     says.join(" ")
@@ -77,7 +77,7 @@ fn deadline(figures: &RunFigures) -> String {
         return "The run was as fast as it goes, without deadlines.".to_owned();
     }
     let (Some(deadline), Some(limit_ms)) = (&figures.deadline, deadline_ms(figures)) else {
-        return match figures.recording {
+        return match figures.read_from {
             Some(_) => "It does not say what deadline the run had.".to_owned(),
             None => "Nothing is said of deadlines.".to_owned(),
         };

@@ -60,6 +60,7 @@ pub fn settings() -> Settings {
         lossless: true,
         in_order_from: None,
         paced: true,
+        rate: 1.0,
         deadline_ms: 100.0,
         stages: ["simulator", "clusterer", "extractor", "classifier"].map(str::to_owned).to_vec(),
     }
