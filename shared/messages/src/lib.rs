@@ -18,6 +18,7 @@ mod descriptors;
 mod detections;
 mod header;
 mod joiner;
+mod order;
 mod raw;
 mod sectors;
 mod solids;
@@ -32,6 +33,7 @@ pub use descriptors::{Bin, Descriptor, Descriptors, MAX_BINS, MIN_FEATURE_POINTS
 pub use detections::{Detection, Detections};
 pub use header::{Refusal, SweepHeader};
 pub use joiner::Joiner;
+pub use order::{Order, Place};
 pub use raw::{Raw, RawError};
 pub use sectors::Cutter;
 pub use solids::{Fit, MAX_FITS, RELIEF, SOLID_PARAMETERS, Solid, SolidFit};

@@ -1,4 +1,5 @@
-//! The only place where time is read. Host time is the kernel's monotonic clock, the same for all processes.
+//! The only place where time is read. Host time is the kernel's monotonic clock, the same for all processes; the time of day is
+//! for people.
 
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec, clock_gettime};
@@ -9,6 +10,12 @@ const NS_PER_S: u64 = 1_000_000_000;
 pub fn now_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
+}
+
+/// Time of day [ns since 1970], as far as the machine knows it. Only for those who keep or show it: it may jump.
+pub fn utc_ns() -> u64 {
+    let now = clock_gettime(ClockId::Realtime);
+    u64::try_from(now.tv_sec).unwrap_or(0) * NS_PER_S + now.tv_nsec as u64
 }
 
 /// Sleeps until host time `until_ns`, or until a signal arrives; returns at once when it is past.

@@ -61,15 +61,23 @@ impl Kept {
         &mut self.places[place]
     }
 
-    /// Makes the next sweep in the place of the earliest. Its number counts once [`Kept::keep`] says that it is used.
-    pub(crate) fn make<S: Source>(&mut self, source: &mut S) -> Result<(&mut Made, Next), ShellError> {
+    /// Makes the next sweep in the place of the earliest, `while_nothing` comes as long as that says so. Its number counts
+    /// once [`Kept::keep`] says that it is used.
+    pub(crate) fn make<S: Source>(
+        &mut self,
+        source: &mut S,
+        while_nothing: impl Fn() -> bool,
+    ) -> Result<(&mut Made, Next), ShellError> {
         if self.end - self.first >= self.places.len() as u64 {
             self.first += 1;
         }
         let made = self.get(self.end);
         made.whole.clear();
         made.truth.clear();
-        let next = source.next(&mut made.whole, &mut made.truth)?;
+        let mut next = source.next(&mut made.whole, &mut made.truth)?;
+        while next == Next::Nothing && while_nothing() {
+            next = source.next(&mut made.whole, &mut made.truth)?;
+        }
         Ok((made, next))
     }
 

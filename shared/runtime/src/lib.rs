@@ -1,6 +1,6 @@
 //! The shell round a stage, written once: wait, stamp, process, send, count.
 //!
-//! [`run_stage`], [`run_source`] and [`run_sink`] are the three main loops. Each has the same order for a part, and the
+//! [`run_stage`], [`run_source`] and [`run_sink`] are the three main loops; [`run_tap`] reads along beside them. Each has the same order for a part, and the
 //! order is what makes the ledger close after a sudden death at any point (see [`page`]):
 //! receive → in hand → process → send → published → counted → out of hand → release.
 
@@ -20,6 +20,7 @@ mod shell;
 mod shutdown;
 mod sink;
 mod source;
+mod tap;
 mod throttle;
 mod window;
 
@@ -31,3 +32,4 @@ pub use shell::{AllocationCount, Shell};
 pub use shutdown::Shutdown;
 pub use sink::run_sink;
 pub use source::run_source;
+pub use tap::run_tap;

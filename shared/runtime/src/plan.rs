@@ -25,6 +25,8 @@ pub struct Plan {
     pub parameters: BTreeMap<String, String>,
     /// Where sweeps come from.
     pub source: SourcePlan,
+    /// Name of the sensor model that they are read with, once that is found.
+    pub sensor: String,
     /// How fast.
     pub pace: Pace,
     /// Sweeps after which the source ends.
@@ -40,10 +42,14 @@ pub struct Plan {
 /// Where sweeps come from.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct SourcePlan {
-    /// A scene or a recording.
+    /// A scene, a recording, or a live sensor's address.
     pub from: PathBuf,
     /// Format of the recording, where it is not to be found by content.
     pub format: Option<String>,
+    /// The topic of an MCAP file that holds several, where it is not to be found.
+    pub topic: Option<String>,
+    /// Both returns of a firing in dual-return mode, not the strongest alone.
+    pub both_returns: bool,
     /// Sensor model, where it is not to be found by format or scene.
     pub sensor: Option<String>,
     /// Nearest accepted range [m], where it is not the sensor file's.
@@ -52,6 +58,8 @@ pub struct SourcePlan {
     pub max_range_m: Option<f64>,
     /// Seconds of sensor time in a second of host time at [`Pace::Realtime`], 0.1 to 10.
     pub rate: f64,
+    /// Each sweep waits until somebody asks for it (`encke ctl step`).
+    pub single_step: bool,
     /// Start again at the recording's end.
     pub repeat: bool,
     /// Seed of the scene, where it is not the scene's own.
@@ -115,6 +123,11 @@ impl Plan {
     /// Where the sink keeps the statistics of one of its lives.
     pub fn snapshot_path(instance: &Instance, incarnation: u32) -> PathBuf {
         instance.dir().join(format!("statistics.{incarnation}.json"))
+    }
+
+    /// Where the tape keeps what one of its lives has written.
+    pub fn counts_path(instance: &Instance, incarnation: u32) -> PathBuf {
+        instance.dir().join(format!("recorded.{incarnation}.json"))
     }
 
     /// Names of all stages in flow order, the source first, the sink last.

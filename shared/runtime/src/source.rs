@@ -91,27 +91,80 @@ impl<'a> Out<'a> {
         })
     }
 
-    /// Makes the next sweep. False at the end of the data.
-    fn make<S: Source>(&mut self, source: &mut S, truth: &mut Truth) -> Result<bool, ShellError> {
-        let began_ns = clock::now_ns();
-        self.whole.clear();
-        let mut next = source.next(&mut self.whole, truth)?;
-        while next == Next::Nothing && !self.shell.leaving() {
-            self.shell.page.beat(clock::now_ns());
-            next = source.next(&mut self.whole, truth)?;
+    fn sectors(&self) -> u64 {
+        u64::from(self.shell.plan.chain.sectors.max(1))
+    }
+
+    /// A successor goes on where its predecessor stopped, in the middle of a sweep if need be; where parts are sent again
+    /// if they are lost, with the first sweep that is not answered.
+    fn begin<S: Source>(&mut self, source: &mut S) -> Result<(), ShellError> {
+        let page = &self.shell.page;
+        if self.window.is_some() && self.shell.incarnation > 1 {
+            self.go_back();
         }
-        self.shell.slow_down(Part { sectors: 1, ..Part::default() });
-        if next != Next::Sweep || self.is_over(&self.whole.header) {
+        self.ordinal = page.next_ordinal_out.get();
+        self.kept.begin(self.ordinal / self.sectors(), source)
+    }
+
+    fn is_between_sweeps(&self) -> bool {
+        self.ordinal.is_multiple_of(self.sectors())
+    }
+
+    fn is_asked_back(&self) -> bool {
+        self.window.as_ref().is_some_and(|window| window.is_asked_back(self.shell.page.attempt.get()))
+    }
+
+    fn go_back_if_asked(&mut self) {
+        if self.is_asked_back() {
+            self.go_back();
+            self.ordinal = self.shell.page.next_ordinal_out.get();
+        }
+    }
+
+    /// The next part is the first of the first sweep that is not answered.
+    fn go_back(&mut self) {
+        let sectors = self.sectors();
+        let Some(window) = &mut self.window else { return };
+        let page = &self.shell.page;
+        let attempt = window.go_back().max(page.attempt.get() + 1);
+        // The window is such that all that may be asked for is kept.
+        let sweep = window.answered_sweeps().max(self.kept.first());
+        let ordinal = (sweep * sectors).min(page.next_ordinal_out.get());
+        tracing::warn!(sweep = ordinal / sectors, attempt, "parts are missing: sending again from this sweep on");
+        page.go_back(ordinal);
+        page.attempt.set(attempt);
+    }
+
+    fn has_sweep(&self) -> bool {
+        self.kept.has(self.ordinal / self.sectors())
+    }
+
+    /// Makes the next sweep. False at the end of the data, or of what was asked for.
+    fn make<S: Source>(&mut self, source: &mut S) -> Result<bool, ShellError> {
+        let plan = &self.shell.plan;
+        if plan.sweeps.is_some_and(|sweeps| self.ordinal / self.sectors() >= sweeps) {
             return Ok(false);
         }
-        self.cutter.measure(&mut self.whole);
-        // A live sweep is due now as a whole: its last return came just before.
-        let began_ns = if source.is_live() { clock::now_ns() } else { began_ns };
-        self.start_ns = match source.is_live() {
-            true => began_ns.saturating_sub(self.whole.header.period_ns),
-            false => self.pacer.start_ns(self.whole.header.sensor_time_ns, began_ns),
+        let mut began_ns = clock::now_ns();
+        let shell = self.shell;
+        let (made, next) = self.kept.make(source, || {
+            shell.page.beat(clock::now_ns());
+            !shell.leaving()
+        })?;
+        self.shell.slow_down(Part { sectors: 1, ..Part::default() });
+        if next != Next::Sweep || is_over(self.shell, &made.whole.header) {
+            return Ok(false);
+        }
+        self.cutter.measure(&mut made.whole);
+        let header = made.whole.header;
+        made.start_ns = if source.is_live() {
+            // Due now as a whole: its last return came just before.
+            began_ns = clock::now_ns();
+            began_ns.saturating_sub(header.period_ns)
+        } else {
+            self.pacer.start_ns(header.sensor_time_ns, began_ns)
         };
-        self.began_ns = began_ns;
+        made.began_ns = began_ns;
         // One step for the whole sweep. At --pace fast results do not depend on how busy the machine is.
         made.step = if plan.pace == Pace::Realtime { self.shell.page.step.get() as u32 } else { 0 };
         self.kept.keep();
@@ -122,6 +175,13 @@ impl<'a> Out<'a> {
     /// that has begun is sent to its end, unless the window stays shut or the supervisor is gone.
     fn send(&mut self) -> Result<bool, ShellError> {
         let shell = self.shell;
+        if shell.plan.source.single_step && self.is_between_sweeps() {
+            let sweep = self.ordinal / self.sectors();
+            wait_while(shell, LOOK_NS, || shell.page.steps.get() <= sweep && !self.is_asked_back());
+            if shell.leaving() || self.is_asked_back() {
+                return Ok(!shell.leaving());
+            }
+        }
         if let Some(window) = &self.window {
             let is_shut = || !window.has_room(shell.page.published.get(), self.ordinal);
             wait_while(shell, WINDOW_LOOK_NS, || is_shut() && !self.is_asked_back());

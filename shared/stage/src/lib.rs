@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
 
+use messages::{Clusters, Descriptors, Detections, Sweep, Trace, Truth};
 pub use messages::{Message, Part, Verdict};
-use messages::{Sweep, Trace, Truth};
 
 /// One room of the chain. Touches no clock, file, thread or IPC.
 pub trait Stage: Sized {
@@ -66,6 +66,46 @@ pub enum Next {
 /// Whom a sink tells of every accepted part that is finished for good (written and flushed): in order, at once, from
 /// whatever thread.
 pub type Settled = Arc<dyn Fn(Part) + Send + Sync>;
+
+/// Reads along beside the chain and keeps what it needs. No stage waits for it, unless nothing may be lost: then the source
+/// runs ahead of [`Tap::done_sweeps`] by no more than its window.
+pub trait Tap {
+    /// Takes a part from the source. `utc_ns` is the time of day [ns since 1970], here and below.
+    fn sweep(&mut self, trace: &Trace, part: &Sweep, utc_ns: u64);
+
+    /// Takes a part from the last stage.
+    fn detections(&mut self, trace: &Trace, part: &Detections, utc_ns: u64);
+
+    /// Whether parts between the stages are wanted, too: of the clusterer, of the extractor.
+    fn wants_between(&self) -> (bool, bool) {
+        (false, false)
+    }
+
+    /// Takes a part from the clusterer, where wanted.
+    fn clusters(&mut self, _trace: &Trace, _part: &Clusters, _utc_ns: u64) {}
+
+    /// Takes a part from the extractor, where wanted.
+    fn descriptors(&mut self, _trace: &Trace, _part: &Descriptors, _utc_ns: u64) {}
+
+    /// Takes what is known of a sweep.
+    fn truth(&mut self, trace: &Trace, truth: &Truth, utc_ns: u64);
+
+    /// Parts of a message type never came: they overflowed the queue.
+    fn missed(&mut self, message: &'static str, parts: u64);
+
+    /// Called about once a second.
+    fn tick(&mut self, utc_ns: u64);
+
+    /// What was taken is to survive this process's death. Called about once a second; where nothing may be lost, whenever
+    /// a sweep has ended and nothing more waits.
+    fn checkpoint(&mut self, utc_ns: u64);
+
+    /// All sweeps below this number are kept, or given up.
+    fn done_sweeps(&mut self) -> u64;
+
+    /// Keeps what there still is to keep.
+    fn finish(&mut self, utc_ns: u64) -> Result<(), SinkError>;
+}
 
 /// Where the chain ends. May own files and a writer thread; never makes the chain wait for them.
 pub trait Sink {

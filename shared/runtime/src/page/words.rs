@@ -166,6 +166,10 @@ pub struct Page {
     /// Source only: number of the step of degradation at which the next sweep is to be processed.
     pub step: Word,
 
+    // Written by `encke ctl`.
+    /// Source only: sweeps asked for, where each waits for that.
+    pub steps: Word,
+
     // Written by `encke inject`.
     /// Parts still to swallow.
     pub swallow: Word,

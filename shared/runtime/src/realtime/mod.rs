@@ -16,7 +16,7 @@ use transport::Instance;
 
 pub use memory::{LockPlan, segment_of, try_lock};
 pub use refusal::{Refusal, Refused, Setting, in_words};
-pub use scheduling::{AsBefore, allowed_cores, raise, try_core, try_priority};
+pub use scheduling::{AsBefore, allowed_cores, raise, stand_back, try_core, try_priority};
 
 /// Gives the calling thread the seat of `process`, and the process the memory that the chain asks for.
 pub fn take_seat(chain: &Chain, process: &str) -> Vec<Refusal> {

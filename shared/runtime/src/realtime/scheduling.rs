@@ -3,7 +3,7 @@
 use preempt_rt::sched::{
     Pid, PreemptRtError, Scheduler, SchedulerParams, get_scheduler, get_scheduler_params, set_scheduler,
 };
-use rustix::process::{Resource, getrlimit};
+use rustix::process::{Resource, getrlimit, setpriority_process};
 use rustix::thread::CapabilitySet;
 use rustix::thread::CpuSet;
 use rustix::thread::capabilities;
@@ -11,6 +11,9 @@ use rustix::thread::sched_getaffinity;
 use rustix::thread::sched_setaffinity;
 
 use super::{Refusal, Setting};
+
+/// Nice value of those who stand back: each step is a quarter.
+const NICER: i32 = 10;
 
 /// The calling thread, for the scheduler's calls.
 const THIS: Pid = Pid::current_thread();
@@ -45,6 +48,12 @@ pub fn raise(priority: u32) -> Result<(), Refusal> {
             ),
         }
     })
+}
+
+/// Puts this process behind the others, with a tenth of their share of a core where they want all of it.
+pub fn stand_back() {
+    // One that may not be nicer already is.
+    let _ = setpriority_process(None, NICER);
 }
 
 /// Lets the calling thread run on one core alone.
