@@ -42,7 +42,12 @@ pub(crate) struct Watched {
 impl Watched {
     /// A stage that is not running yet, with a fresh page. `ours` says whether the supervisor starts it.
     pub(crate) fn new(instance: &Instance, plan: &Plan, position: usize, ours: bool) -> Result<Self, SupervisorError> {
-        let name = plan.stages().nth(position).unwrap_or(SOURCE).to_owned();
+        Self::named(instance, plan, plan.stages().nth(position).unwrap_or(SOURCE), ours)
+    }
+
+    /// The same by name, for a process that is no stage of the chain.
+    pub(crate) fn named(instance: &Instance, plan: &Plan, name: &str, ours: bool) -> Result<Self, SupervisorError> {
+        let name = name.to_owned();
         let page = PageMap::create(&Plan::page_path(instance, &name))?;
         let restarts = Restarts::new(plan.chain.restart_budget);
         Ok(Self {

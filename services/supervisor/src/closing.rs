@@ -16,16 +16,17 @@ impl Watch<'_> {
     pub(crate) fn sample(&mut self) {
         let settled = clock::now_ns() - self.started_ns >= SETTLE_NS
             && self.stages[0].page.published.get() >= SETTLE_SWEEPS * u64::from(self.plan.chain.sectors);
-        for stage in &mut self.stages {
+        for stage in self.stages.iter_mut().chain(self.tape.as_mut().map(|tape| &mut tape.process)) {
             if let Some(pid) = stage.pid() {
                 stage.usage.update(pid.as_raw_nonzero().get() as u32, settled);
             }
         }
         self.usage.update(std::process::id(), settled);
-        let own_cpu_s = self.stages.iter().map(|stage| stage.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
+        let processes = || self.stages.iter().chain(self.tape.iter().map(|tape| &tape.process));
+        let own_cpu_s = processes().map(|process| process.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
         let now_ns = clock::now_ns();
         let machine = self.machine.look(now_ns, own_cpu_s);
-        let usages = self.stages.iter().map(|stage| &stage.usage).chain([&self.usage]);
+        let usages = processes().map(|process| &process.usage).chain([&self.usage]);
         self.timeline.look(now_ns, usages, machine, self.noise.take_latest_ns());
     }
 
@@ -43,8 +44,9 @@ impl Watch<'_> {
         let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
         self.usage.update(std::process::id(), true);
         let pages: Vec<(&str, &Page)> = self.stages.iter().map(|stage| (stage.name.as_str(), &*stage.page)).collect();
+        let beside = self.tape.iter().map(|tape| &tape.process);
         let mut processes: Vec<_> =
-            self.stages.iter().map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
+            self.stages.iter().chain(beside).map(|stage| ProcessReport::of_stage(stage, duration_s)).collect();
         processes.push(ProcessReport::of_supervisor(&self.usage, duration_s));
         let snapshot = self.snapshot();
         let stages: Vec<&str> = snapshot.stages.iter().map(|stage| stage.stage.as_str()).collect();
@@ -63,6 +65,7 @@ impl Watch<'_> {
             noise_ms: self.noise.finish(),
             realtime_refused: std::mem::take(&mut self.refused),
             stopped: self.failed.clone(),
+            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, self.plan)),
         })
     }
 

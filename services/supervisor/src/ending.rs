@@ -6,7 +6,6 @@ use runtime::clock;
 use runtime::page::State;
 
 use crate::SupervisorError;
-use crate::child::Watched;
 use crate::watch::Watch;
 
 /// How long a stage may take to drain its input, and then to leave [ns].
@@ -36,7 +35,7 @@ impl Watch<'_> {
                 }
             }
         }
-        Ok(())
+        self.end_tape()
     }
 
     /// Tells a stage to leave and waits for it; one that does not is killed.
@@ -58,15 +57,18 @@ impl Watch<'_> {
 
     /// Kills every stage, when the chain cannot go on.
     pub(crate) fn kill_all(&mut self) {
-        for stage in &mut self.stages {
-            stage.told = true;
-            stage.kill();
+        for process in self.stages.iter_mut().chain(self.tape.as_mut().map(|tape| &mut tape.process)) {
+            process.told = true;
+            process.kill();
         }
         clock::wait_for(LEAVE_PATIENCE_NS, || {
-            for stage in &mut self.stages {
-                stage.look();
-            }
-            !self.stages.iter().any(Watched::is_alive)
+            let beside = self.tape.as_mut().map(|tape| &mut tape.process);
+            // Each is looked at, whatever the others are.
+            let alive = self.stages.iter_mut().chain(beside).filter_map(|process| {
+                process.look();
+                process.is_alive().then_some(())
+            });
+            alive.count() == 0
         });
         self.node.clean_dead(Duration::from_millis(100));
     }

@@ -3,6 +3,7 @@
 //!
 //! Reading order: [`run`] → `watch` (the loop) → `settle` (after a death) → `ledger` (the account) → `report`.
 
+mod beside;
 mod budget;
 mod child;
 mod closing;
@@ -25,6 +26,7 @@ mod timeline;
 mod timeline_report;
 mod watch;
 
+pub use beside::RecordingReport;
 pub use error::SupervisorError;
 pub use house::{Running, running_instances, stage_process};
 pub use ledger::{GapReport, HopReport, LedgerReport};

@@ -5,6 +5,7 @@ use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, WorstSweep};
 use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
+use crate::beside::RecordingReport;
 use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
 use crate::overload::OverloadReport;
@@ -68,6 +69,8 @@ pub struct Report {
     pub lost_sweeps: LostSweeps,
     /// The trace file in numbers, where one was written.
     pub trace: Option<TraceReport>,
+    /// What was recorded, where anything was.
+    pub recording: Option<RecordingReport>,
     /// Why the run stopped before its end, where it did.
     pub stopped: Option<String>,
     /// How the command ends, and why.
@@ -156,6 +159,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) noise_ms: Percentiles,
     pub(crate) realtime_refused: Vec<String>,
     pub(crate) stopped: Option<String>,
+    pub(crate) recording: Option<RecordingReport>,
     pub(crate) timeline: TimelineReport,
 }
 
@@ -212,6 +216,7 @@ impl Report {
                 failed: trace.failed,
             }),
             ledger,
+            recording: facts.recording,
             stopped,
             verdict: VerdictReport::default(),
             timeline: facts.timeline,
@@ -253,7 +258,11 @@ impl Report {
         if let Some(TraceReport { lost, failed: true, .. }) = self.trace {
             return Some(format!("a file failed: the trace lacks {lost} parts"));
         }
-        if missing > 0 && (strict || self.pace == Pace::Fast) {
+        let lossless = strict || self.pace == Pace::Fast;
+        if let Some(failure) = self.recording.as_ref().and_then(|recording| recording.failure(lossless)) {
+            return Some(failure);
+        }
+        if missing > 0 && lossless {
             return Some(format!("{missing} parts were dropped or lost"));
         }
         if strict && self.deadline.misses > 0 {

@@ -13,7 +13,7 @@ use crate::services::Services;
 /// How long the next stage may take to drain what the dead one had sent [ns].
 const DRAIN_PATIENCE_NS: u64 = 300_000_000;
 /// How long another cleaner may take.
-const CLEAN_PATIENCE: Duration = Duration::from_millis(100);
+pub(crate) const CLEAN_PATIENCE: Duration = Duration::from_millis(100);
 
 /// Settles the account of the stage at `position`, whose process has ended.
 pub(crate) fn settle(node: &Node, services: &Services, stages: &mut [Watched], position: usize, ended: Ended) {

@@ -38,6 +38,10 @@ pub struct StageStatus {
     pub received: u64,
     /// Parts published; the sink: accepted.
     pub published: u64,
+    /// Parts that overflowed the queue before it.
+    pub dropped: u64,
+    /// Parts that died with a process on the way to it, or in it.
+    pub lost: u64,
 }
 
 /// Reads the pages of a running instance.
@@ -54,6 +58,8 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
             heartbeat_age_ms: clock::now_ns().saturating_sub(page.heartbeat_ns.get()) as f64 / 1e6,
             received: page.received.get(),
             published: page.published.get(),
+            dropped: page.dropped.get(),
+            lost: page.lost.get(),
         });
     }
     let sectors = plan.chain.sectors;

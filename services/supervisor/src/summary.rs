@@ -6,6 +6,7 @@ use messages::Step;
 use recorder::{Percentiles, WorstHop, WorstSweep};
 
 use crate::Report;
+use crate::beside::RecordingReport;
 use crate::report::{LEAST_MARGIN_PCT, TraceReport};
 
 /// The summary of a run, a page of text.
@@ -39,6 +40,16 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
     write_machine(text, report)?;
     let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
     writeln!(text, "\ndetections  {}", classes.join("  "))?;
+    if let Some(recording) = &report.recording {
+        let RecordingReport { file, counts, restarts, .. } = recording;
+        let mib = counts.bytes as f64 / f64::from(1 << 20);
+        let messages: u64 = counts.topics.iter().map(|topic| topic.messages).sum();
+        let (files, lost) = (counts.files, counts.lost());
+        writeln!(
+            text,
+            "recording   {messages} messages, {lost} lost, in {files} files, {mib:.1} MiB, {restarts} restarts: {file}"
+        )?;
+    }
     if let Some(reason) = &report.stopped {
         writeln!(text, "STOPPED: {reason}")?;
     }

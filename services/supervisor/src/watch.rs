@@ -10,6 +10,7 @@ use signal_hook::iterator::Signals;
 use transport::{Instance, Node};
 
 use crate::SupervisorError;
+use crate::beside::Tape;
 use crate::child::{Ended, Watched};
 use crate::house::House;
 use crate::machine::Machine;
@@ -31,7 +32,7 @@ const START_PATIENCE_NS: u64 = 10_000_000_000;
 /// How long nothing may move after the source has ended [ns].
 const STALL_NS: u64 = 5_000_000_000;
 /// Exit code of a stage that cannot start: restarting it would not help.
-const CANNOT_START: i32 = 2;
+pub(crate) const CANNOT_START: i32 = 2;
 
 /// What to run.
 pub struct Settings<'a> {
@@ -81,6 +82,7 @@ pub(crate) struct Watch<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) spawn: bool,
     pub(crate) stages: Vec<Watched>,
+    pub(crate) tape: Option<Tape>,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
     pub(crate) node: Node,
@@ -116,6 +118,7 @@ impl<'a> Watch<'a> {
         let count = plan.stages().count();
         let stages =
             (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
+        let tape = Tape::new(instance, plan, spawn)?;
         plan.write(instance)?;
         let now_ns = clock::now_ns();
         let mut watch = Self {
@@ -123,6 +126,7 @@ impl<'a> Watch<'a> {
             plan,
             spawn,
             stages,
+            tape,
             services,
             node,
             signals,
@@ -153,6 +157,9 @@ impl<'a> Watch<'a> {
     }
 
     fn start_all(&mut self) -> Result<(), SupervisorError> {
+        if let Some(tape) = &mut self.tape {
+            tape.process.start()?;
+        }
         for position in (1..self.stages.len()).rev() {
             self.stages[position].start()?;
         }
@@ -187,19 +194,26 @@ impl<'a> Watch<'a> {
         let end_ns = clock::now_ns() + patience_ns;
         loop {
             self.look_once()?;
-            if self.stop_asked || self.stages[first..].iter().all(Watched::is_up) {
+            let beside = self.tape.iter().filter(|tape| !tape.is_up()).map(|tape| &tape.process);
+            let missing: Vec<_> = self.stages[first..].iter().filter(|stage| !stage.is_up()).chain(beside).collect();
+            if self.stop_asked || missing.is_empty() {
                 return Ok(());
             }
             if clock::now_ns() > end_ns {
-                let missing = self.stages[first..].iter().filter(|stage| !stage.is_up());
-                return Err(SupervisorError::NotUp(missing.map(|stage| stage.name.clone()).collect()));
+                return Err(SupervisorError::NotUp(missing.iter().map(|stage| stage.name.clone()).collect()));
             }
         }
     }
 
     /// Watches until the source has ended and everything has come through, or until asked to stop; then ends the chain.
     fn watch_through(mut self) -> Result<Report, SupervisorError> {
-        while !self.stop_asked && self.failed.is_none() && !self.is_done() && !self.is_stalled() {
+        while !self.stop_asked && self.failed.is_none() && !self.is_done() {
+            if self.is_stalled() {
+                if self.plan.pace == Pace::Fast {
+                    self.failed = Some("nothing moved for 5 s: the chain was stopped".to_owned());
+                }
+                break;
+            }
             if let Err(error) = self.look_once() {
                 self.kill_all();
                 return Err(error);
@@ -219,6 +233,7 @@ impl<'a> Watch<'a> {
             && self.stages[0].is_up()
             && (1..self.stages.len()).all(|position| self.is_drained(position))
             && (self.plan.pace == Pace::Realtime || self.is_answered())
+            && self.is_on_tape()
     }
 
     /// Whether the sink has answered all that was sent, however often.
@@ -234,7 +249,8 @@ impl<'a> Watch<'a> {
         if moved != self.moved {
             (self.moved, self.moved_ns) = (moved, clock::now_ns());
         }
-        if !self.begun || clock::now_ns() - self.moved_ns < STALL_NS {
+        let waits_for_step = self.plan.source.single_step && self.is_answered();
+        if !self.begun || waits_for_step || clock::now_ns() - self.moved_ns < STALL_NS {
             return false;
         }
         let drained = (1..self.stages.len()).all(|position| self.is_drained(position));
@@ -272,6 +288,7 @@ impl<'a> Watch<'a> {
             }
             self.name_losses(position);
         }
+        self.look_at_tape()?;
         self.climb();
         let now_ns = clock::now_ns();
         if now_ns >= self.next_sample_ns {
@@ -284,6 +301,9 @@ impl<'a> Watch<'a> {
 
     /// A stage's process has ended: settle its account and start its successor.
     fn recover(&mut self, position: usize, ended: Ended) -> Result<(), SupervisorError> {
+        if let Some(tape) = self.tape.as_ref().filter(|_| position == 0 || self.is_sink(position + 1)) {
+            tape.drain();
+        }
         settle(&self.node, &self.services, &mut self.stages, position, ended);
         let stage = &mut self.stages[position];
         if stage.told {
