@@ -146,6 +146,7 @@ fn first_sweep(plan: &SourcePlan, assets: &Assets) -> Result<Box<Sweep>, Failure
     match sources::open(plan, assets)? {
         Opened::Scene(mut simulator) => first_sweep_of(simulator.as_mut(), &plan.from),
         Opened::Recording(mut recording) => first_sweep_of(recording.as_mut(), &plan.from),
+        Opened::Live(_) => Err(Failure::start("bench takes a scene or a recording, not a live sensor")),
     }
 }
 

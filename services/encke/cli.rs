@@ -1,7 +1,12 @@
+mod look;
+mod notes;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+pub(crate) use look::{LiveArgs, ReportArgs, TopArgs, ViewArgs};
+use notes::*;
 use runtime::Pace;
 
 /// Onboard lidar perception for spacecraft in clutter: a chain of processes that turns lidar sweeps into classified
@@ -48,117 +53,25 @@ pub(crate) enum Command {
     /// Put one fault into a running chain, to see it accounted for.
     #[command(after_help = INJECT_EXAMPLES)]
     Inject(InjectArgs),
-    /// Look at a running chain, or stop it.
+    /// Look at a running chain, let it take a step, or stop it.
     #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
     Ctl(CtlArgs),
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
     Doctor(DoctorArgs),
+    /// Make one HTML page, with plots, of a run's report or recording.
+    #[command(after_help = REPORT_NOTES)]
+    Report(ReportArgs),
     /// Show a running chain in the terminal.
     #[command(after_help = TOP_NOTES)]
     Top(TopArgs),
     /// Serve a running chain to Foxglove, over a WebSocket.
     #[command(after_help = LIVE_NOTES)]
     Live(LiveArgs),
+    /// Show a recording in a browser: cloud, obstacles, latencies. As one page that needs nothing else, or served.
+    #[command(after_help = VIEW_NOTES)]
+    View(ViewArgs),
 }
-
-const RUN_EXAMPLES: &str = "Examples:
-  encke run                                        the default scene, 100 sweeps
-  encke run --from capture.pcap --detections d.jsonl --labels l.csv
-  encke run --from config/scenes/ring-crossing.toml --duration 60s --report report.json
-  encke run --from sweeps/ --pace fast             as fast as it goes, nothing dropped
-  encke run --duration 10s --trace trace.json      open the file in ui.perfetto.dev
-
-Ctrl-C and SIGTERM stop the chain in order, drain it, and print the summary.";
-
-const SIMULATE_EXAMPLES: &str = "Examples:
-  encke simulate --scene config/scenes/default.toml --sweeps 50 --out scene.pcap
-  encke simulate --scene config/scenes/reference.toml --sweeps 5 --out sweeps/";
-
-const EVALUATE_NOTES: &str = "\
-Simulated scenes that nothing was trained on go through clusterer, extractor and the classifier,
-as configured. What is looked at, and the targets: config/evaluation/reference.toml; what each
-bar measures: services/ground/README.md.
-Exit codes: 0 all bars hold, 1 one falls short, 2 cannot start.
-
-Examples:
-  encke evaluate                                   the bars as a table
-  encke evaluate --out report/                     with plots: report/evaluate.html
-  encke evaluate --from capture.pcap               and how much is claimed of a recording
-  encke evaluate --paper --out report/             the paper's tables and figures: report/paper.html";
-
-const BENCH_NOTES: &str = "Stages, each on what those before it left:
-  cluster      the clusterer's `process`: clusters, and the cells round them
-  normals      nearest neighbours of every point, and normals; clusters with features only
-  histogram    angles of all pairs and the joint histogram, on the neighbours and normals found
-  svm          the classifier's `process` with its support vector machine, posterior included;
-               with --model: decision values and votes, several clusters at a time, no posterior
-  fit          the extractor's whole `process` from the clusters, with solids and no histograms
-  paper_chain  cluster, the extractor's whole `process` with histograms (normals, histogram,
-               choice of columns) and no solids, svm
-  full_chain   cluster, extractor and classifier as their files have them
-  paper_last_sector, full_last_sector
-               what both chains have still to do when the last of the chain's sectors has come
-
-The sweep is a recording's first complete one (its first where none is), or a scene's first.
-Reading it is not timed. All runs must give the same output to the byte, else the exit code is 1.
-JSON lines of `fit` also say how many clusters had a fit, and the mean of residuals evaluated for one.
-
---hop times something else: how long a sweep of 1.1 MB takes from one process to another that
-sleeps, through the chain's shared memory and through a Unix socket, by turns.
-
-Examples:
-  encke bench --from config/scenes/default.toml
-  encke bench --hop --runs 2000
-  encke bench --from sweeps/s4k.csv sweeps/s70k.csv --runs 50 --range 0.5 --json";
-
-const DOCTOR_NOTES: &str = "\
-ok: as it should be. warn: the chain runs, and would run better with the remedy. fail: it cannot run.
-Nothing is changed: what is tried is undone at once.
-Exit codes: 0 the chain can run, 1 it cannot, 2 its configuration cannot be read.
-
-Examples:
-  encke doctor
-  encke doctor --chain config/chain.toml --json    also what chain.toml asks for and would be refused";
-
-const INJECT_EXAMPLES: &str = "Faults:
-  kill     SIGKILL to the stage's process
-  stop     SIGSTOP, and SIGCONT after --for (500 ms)
-  slow     make its work on each sweep longer by --by (20 ms); --by 0ms ends it
-  swallow  let it lose one part and say nothing: the ledger must come out OPEN
-
-Example:
-  encke inject stop clusterer --for 500ms";
-
-const REPORT_NOTES: &str = "\
-The page needs nothing else: no script, no font, no address. It shows the distribution of latency and
-how it went over time, what sweeps spent it on, misses by cause, the slowest sweeps, the ledger, CPU and
-memory, and detections by class. What the file lacks, the page says.
-Exit codes: 0 done, 2 the file is no report, or the page cannot be written.
-
-Examples:
-  encke run --report r.json && encke report r.json            writes r.html
-  encke report flight.mcap --out flight.html
-  encke report flight.mcap --json";
-
-const LIVE_NOTES: &str = "\
-Topics: /encke/sweep, /encke/clusters, /encke/detections, /encke/events, /encke/status. It runs behind everything else on
-the machine; what a slow viewer cannot take is not sent, and counted. Standard output has the address, and at the end where
-the messages went.
-
-Examples:
-  encke live                                   then open ws://127.0.0.1:8765 in Foxglove
-  encke live --instance flight-1 --port 9000 --wait";
-
-const VIEW_NOTES: &str = "\
-The page needs WebGL 2 and no network; any browser of 2023 or later shows it. A written page holds its sweeps, and leaves
-some out evenly where they would take more than --limit-mb. A served one fetches them as it shows them: for long recordings.
-
-Examples:
-  encke view run.mcap                              writes run.html
-  encke view run.mcap --out page.html --first 100 --sweeps 50 --open
-  encke view run.mcap --serve                      says where; Ctrl-C ends it
-  encke view --live                                the chain that runs, as it runs";
 
 /// Options of `encke run`.
 #[derive(Args, Clone, Debug)]
@@ -166,7 +79,7 @@ pub(crate) struct RunArgs {
     /// The topology: [default: ./config/chain.toml, else the one built in]
     #[arg(long, value_name = "FILE")]
     pub(crate) chain: Option<PathBuf>,
-    /// A scene (.toml) or a recording, a file or a folder. [default: chain.toml's]
+    /// A scene (.toml), a recording (a file, a folder, a quoted pattern), or udp://ADDRESS:PORT. [default: chain.toml's]
     #[arg(long, value_name = "SOURCE")]
     pub(crate) from: Option<PathBuf>,
     /// Format of the recording, where it is not to be found by content.
@@ -175,16 +88,23 @@ pub(crate) struct RunArgs {
     /// Sensor model: the stem of a file in config/sensors.
     #[arg(long, value_name = "NAME")]
     pub(crate) sensor: Option<String>,
+    /// The topic of an MCAP file to read, where several hold sweeps.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) topic: Option<String>,
+    /// Of a firing that gave two returns: the strongest, or both.
+    #[arg(long, value_enum, default_value_t = ReturnsArg::Strongest)]
+    pub(crate) returns: ReturnsArg,
     /// Refuse returns nearer than this. [default: the sensor file's]
     #[arg(long, value_name = "M")]
     pub(crate) min_range: Option<f64>,
     /// Refuse returns farther than this. [default: the sensor file's]
     #[arg(long, value_name = "M")]
     pub(crate) max_range: Option<f64>,
-    /// At sensor rate (a slow stage drops and counts), or as fast as the chain goes (nothing is dropped).
+    /// At sensor rate (a slow stage drops and counts), as fast as the chain goes (nothing is dropped), or the same a sweep
+    /// at a time: `encke ctl step` asks for the next.
     #[arg(long, value_enum, default_value_t = PaceArg::Realtime)]
     pub(crate) pace: PaceArg,
-    /// So many times as fast as the sensor was: 0.1 to 10. Not with --pace fast.
+    /// So many times as fast as the sensor was: 0.1 to 10. With --pace realtime.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_rate)]
     pub(crate) rate: f64,
     /// Stop after N sweeps. [default: 100 for a scene, all of a recording]
@@ -242,18 +162,26 @@ impl Default for RunArgs {
     }
 }
 
+/// `--returns`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ReturnsArg {
+    Strongest,
+    Both,
+}
+
 /// `--pace`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PaceArg {
     Realtime,
     Fast,
+    Step,
 }
 
 impl From<PaceArg> for Pace {
     fn from(pace: PaceArg) -> Self {
         match pace {
             PaceArg::Realtime => Self::Realtime,
-            PaceArg::Fast => Self::Fast,
+            PaceArg::Fast | PaceArg::Step => Self::Fast,
         }
     }
 }
@@ -301,7 +229,7 @@ pub(crate) struct SimulateArgs {
     /// How many sweeps.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(crate) sweeps: u64,
-    /// Where to: a `.pcap` of HDL-32E packets, or a folder of CSV files.
+    /// Where to: a `.pcap` of HDL-32E packets, an `.mcap` of messages, or a folder of CSV files.
     #[arg(long, value_name = "X")]
     pub(crate) out: PathBuf,
     /// Seed of the scene. [default: the scene's own]
@@ -432,6 +360,8 @@ pub(crate) enum Request {
     Status,
     /// Stop in order, drain, report.
     Stop,
+    /// With --pace step: one more sweep.
+    Step,
 }
 
 /// Options of `encke ctl`.
@@ -457,79 +387,6 @@ pub(crate) struct DoctorArgs {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// Options of `encke report`.
-#[derive(Args, Clone, Debug)]
-pub(crate) struct ReportArgs {
-    /// A report of `encke run --report`, or a recording of `encke run --record`; found by content.
-    #[arg(value_name = "FILE")]
-    pub(crate) file: PathBuf,
-    /// The page; - is standard output. [default: FILE with the ending .html]
-    #[arg(long, value_name = "FILE.html", conflicts_with = "json")]
-    pub(crate) out: Option<PathBuf>,
-    /// Print the figures as JSON instead: those of a recording are worked out from it.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// Options of `encke live`.
-#[derive(Args, Clone, Debug)]
-pub(crate) struct LiveArgs {
-    /// The chain. [default: the only one that runs]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) instance: Option<String>,
-    /// Address to listen on; whoever reaches another than this machine's own sees the chain.
-    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1")]
-    pub(crate) bind: String,
-    /// Port to listen on; 0 is any that is free.
-    #[arg(long, default_value_t = 8765)]
-    pub(crate) port: u16,
-    /// When the chain ends, wait for its next start.
-    #[arg(long)]
-    pub(crate) wait: bool,
-    /// Print where the messages went as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// Options of `encke view`.
-#[derive(Args, Clone, Debug)]
-pub(crate) struct ViewArgs {
-    /// A recording of Encke's: `encke run --record FILE.mcap`.
-    #[arg(value_name = "FILE.mcap", required_unless_present = "live")]
-    pub(crate) file: Option<PathBuf>,
-    /// Serve what a running chain sees instead; it neither waits for that nor knows of it.
-    #[arg(long, conflicts_with_all = ["file", "out", "first", "sweeps", "every", "limit_mb"])]
-    pub(crate) live: bool,
-    /// The chain. [default: the only one that runs]
-    #[arg(long, value_name = "NAME", requires = "live")]
-    pub(crate) instance: Option<String>,
-    /// The page. [default: the recording's name with .html]
-    #[arg(long, value_name = "PAGE.html")]
-    pub(crate) out: Option<PathBuf>,
-    /// Serve the page and its sweeps instead, until stopped; only to this machine unless another address is given.
-    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
-    #[arg(conflicts_with_all = ["out", "limit_mb"])]
-    pub(crate) serve: Option<std::net::SocketAddr>,
-    /// Leave out so many sweeps at the start.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) first: usize,
-    /// Look at so many sweeps from there. [default: all]
-    #[arg(long, value_name = "N")]
-    pub(crate) sweeps: Option<usize>,
-    /// Show every K-th of them.
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    pub(crate) every: usize,
-    /// Show at most so many returns of a sweep. [default: all]
-    #[arg(long, value_name = "N")]
-    pub(crate) points: Option<usize>,
-    /// Most that the sweeps in a written page may take [MB].
-    #[arg(long, value_name = "MB", default_value_t = 40)]
-    pub(crate) limit_mb: usize,
-    /// Open it in the browser.
-    #[arg(long)]
-    pub(crate) open: bool,
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use classifier::{Card, Classifier, FeatureDefinition, ModelFiles, SolidsDefiniti
 use clusterer::Clusterer;
 use extractor::Extractor;
 use recorder::{Recorder, Settings};
-use runtime::{Pace, Plan, SOURCE, Shell, ShellError, run_sink, run_source, run_stage};
+use runtime::{Pace, Plan, SOURCE, Shell, ShellError, TAPE, run_sink, run_source, run_stage, run_tap};
 use serde::de::DeserializeOwned;
 use stage::{InitError, Settled, Stage};
 use transport::Instance;
@@ -12,6 +12,7 @@ use transport::Instance;
 use crate::assets::Assets;
 use crate::cli::StageArgs;
 use crate::sources::{self, Opened};
+use crate::taping::{self, Taping};
 use crate::{Failure, heap_allocations};
 
 /// Name of the sink.
@@ -28,6 +29,7 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
         SOURCE => match sources::open(&plan.source, &assets)? {
             Opened::Scene(simulator) => enter(plan).and_then(|shell| run_source(*simulator, &shell)),
             Opened::Recording(recording) => enter(plan).and_then(|shell| run_source(*recording, &shell)),
+            Opened::Live(live) => enter(plan).and_then(|shell| run_source(*live, &shell)),
         },
         Clusterer::NAME => {
             let stage = clusterer(&plan)?;
@@ -42,6 +44,10 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
             enter(plan).and_then(|shell| run_stage(stage, &shell))
         }
         RECORDER => enter(plan).and_then(|shell| run_sink(shell, recorder)),
+        TAPE => match enter(plan) {
+            Ok(shell) => run_tap(Taping::start(&shell, &assets)?, &shell),
+            Err(error) => Err(error),
+        },
         name => return Err(unknown(name)),
     };
     outcome.map_err(|error| match error {
@@ -50,9 +56,12 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
     })
 }
 
-/// Builds everything that the plan names once, so that what a stage would refuse is known before any process starts.
-pub(crate) fn check(plan: &Plan, assets: &Assets) -> Result<(), Failure> {
-    drop(sources::open(&plan.source, assets)?);
+/// Builds everything that the plan names once, and gives the name of its sensor, so that what a stage would refuse is known before any process starts.
+pub(crate) fn check(plan: &Plan, assets: &Assets) -> Result<String, Failure> {
+    let sensor = sources::open(&plan.source, assets)?.sensor_name().to_owned();
+    if plan.tape().is_some() {
+        drop(taping::settings(assets)?);
+    }
     for stage in &plan.chain.stages {
         match stage.name.as_str() {
             Clusterer::NAME => drop(clusterer(plan)?),
@@ -62,11 +71,11 @@ pub(crate) fn check(plan: &Plan, assets: &Assets) -> Result<(), Failure> {
             name => return Err(unknown(name)),
         }
     }
-    Ok(())
+    Ok(sensor)
 }
 
 fn unknown(name: &str) -> Failure {
-    let known = [SOURCE, Clusterer::NAME, Extractor::NAME, Classifier::NAME, RECORDER].join(", ");
+    let known = [SOURCE, Clusterer::NAME, Extractor::NAME, Classifier::NAME, RECORDER, TAPE].join(", ");
     Failure::start(format!("no stage {name:?}; there are {known}"))
 }
 
@@ -185,6 +194,7 @@ fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
         lossless: plan.pace == Pace::Fast,
         in_order_from: (plan.pace == Pace::Fast).then(|| shell.answered_sweeps()),
         paced: plan.pace == Pace::Realtime,
+        rate: plan.source.rate,
         deadline_ms: plan.chain.deadline_ms,
         stages: plan.stages().filter(|stage| *stage != RECORDER).map(str::to_owned).collect(),
     };

@@ -71,7 +71,7 @@ pub(crate) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
     let chain = &plan.chain;
     let bill = shared_memory::bill(chain);
     let mut checks = vec![match dispatch::check(&plan, &assets) {
-        Ok(()) => Check::ok("chain", format!("{} stages and a source, all can be built", chain.stages.len())),
+        Ok(_) => Check::ok("chain", format!("{} stages and a source, all can be built", chain.stages.len())),
         Err(Failure::CannotStart(cause) | Failure::Failed(cause)) => {
             Check::fail("chain", cause, "set right what it names")
         }

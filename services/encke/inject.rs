@@ -10,12 +10,16 @@ use crate::{Failure, instances};
 pub(crate) fn inject(args: &InjectArgs) -> Result<(), Failure> {
     let (instance, _) = instances::find(args.instance.as_deref())?;
     let plan = Plan::read(&instance).map_err(Failure::start)?;
-    if !plan.stages().any(|stage| stage == args.stage) {
-        let stages: Vec<_> = plan.stages().collect();
+    let stages: Vec<_> = plan.stages().chain(plan.tape()).collect();
+    if !stages.contains(&args.stage.as_str()) {
         return Err(Failure::start(format!("no stage {:?}; there are {}", args.stage, stages.join(", "))));
     }
     let page = PageMap::open(&Plan::page_path(&instance, &args.stage)).map_err(Failure::start)?;
     match args.fault {
+        // These two are for the shell round a stage.
+        Fault::Slow | Fault::Swallow if plan.tape() == Some(&args.stage) => {
+            return Err(Failure::start("the tape can only be killed or stopped: name a stage of the chain"));
+        }
         Fault::Slow => page.slow_ns.set(args.by.as_nanos() as u64),
         Fault::Swallow => page.swallow.give(1),
         Fault::Kill => signal(&instance, &page, args, Signal::KILL)?,

@@ -18,6 +18,7 @@ mod report;
 mod run;
 mod simulate;
 mod sources;
+mod taping;
 mod top;
 mod train;
 mod view;
@@ -82,8 +83,10 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::inject(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
+        Command::Report(args) => report::report(&args),
         Command::Top(args) => top::top(&args),
         Command::Live(args) => live::live(&args),
+        Command::View(args) => view::view(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

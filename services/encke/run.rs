@@ -8,16 +8,16 @@ use supervisor::{Report, Settings};
 use transport::Instance;
 
 use crate::assets::Assets;
-use crate::cli::{PaceArg, RunArgs, Span};
+use crate::cli::{PaceArg, ReturnsArg, RunArgs, Span};
 use crate::{Failure, dispatch, outputs, sources};
 
 /// Runs the chain and prints its summary.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
     let assets = Assets::beside(args.chain.as_deref());
-    let plan = plan(args, &assets)?;
+    let mut plan = plan(args, &assets)?;
     // What a stage would refuse is refused here, before anything starts.
-    dispatch::check(&plan, &assets)?;
+    plan.sensor = dispatch::check(&plan, &assets)?;
     let name = args.instance.clone().unwrap_or_else(|| format!("run-{}", std::process::id()));
     let instance = Instance::named(&name).map_err(Failure::start)?;
     let iceoryx2_config = assets.text("iceoryx2.toml").map_err(Failure::start)?;
@@ -60,7 +60,7 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
         None => sources::locate_default(&chain.default_source, assets)?,
     };
     let is_scene = sources::is_scene(&from);
-    refuse_idle_options(args, is_scene)?;
+    refuse_idle_options(args, is_scene, sources::live(&from)?.is_some())?;
     let (sweeps, duration_ns) = match (args.sweeps, args.duration) {
         (Some(sweeps), _) => (Some(sweeps), None),
         (None, Some(Span::For(duration))) => (None, Some(duration.as_nanos() as u64)),
@@ -79,12 +79,16 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
             from,
             format: args.format.clone(),
             sensor: args.sensor.clone(),
+            topic: args.topic.clone(),
+            both_returns: matches!(args.returns, ReturnsArg::Both),
             min_range_m: args.min_range,
             max_range_m: args.max_range,
             repeat: args.repeat,
             seed: args.seed,
             rate: args.rate,
+            single_step: matches!(args.pace, PaceArg::Step),
         },
+        sensor: String::new(),
         pace: args.pace.into(),
         sweeps,
         duration_ns,
@@ -100,20 +104,34 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
 }
 
 /// An option that would change nothing is a mistake of the one who wrote it.
-fn refuse_idle_options(args: &RunArgs, is_scene: bool) -> Result<(), Failure> {
+fn refuse_idle_options(args: &RunArgs, is_scene: bool, is_live: bool) -> Result<(), Failure> {
     let for_recordings = [
         ("--format", args.format.is_some()),
         ("--sensor", args.sensor.is_some()),
         ("--min-range", args.min_range.is_some()),
         ("--max-range", args.max_range.is_some()),
         ("--loop", args.repeat),
+        ("--topic", args.topic.is_some()),
+        ("--returns", matches!(args.returns, ReturnsArg::Both)),
     ];
+    let of_files = [
+        ("--format", args.format.is_some()),
+        ("--loop", args.repeat),
+        ("--topic", args.topic.is_some()),
+        ("--rate", args.rate != 1.0),
+        ("--pace", !matches!(args.pace, PaceArg::Realtime)),
+    ];
+    if let Some((option, _)) = of_files.into_iter().find(|(_, given)| *given && is_live) {
+        return Err(Failure::start(format!(
+            "{option} is not for live sensors, which come when they come: leave it out"
+        )));
+    }
     let idle = for_recordings.into_iter().find(|(_, given)| *given && is_scene);
     if let Some((option, _)) = idle {
         return Err(Failure::start(format!("{option} is for recordings, and the source is a scene: leave it out")));
     }
-    if args.rate != 1.0 && matches!(args.pace, PaceArg::Fast) {
-        return Err(Failure::start("--rate is for --pace realtime, and the pace is fast: leave one of them out"));
+    if args.rate != 1.0 && !matches!(args.pace, PaceArg::Realtime) {
+        return Err(Failure::start("--rate is for --pace realtime: leave one of them out"));
     }
     if args.seed.is_some() && !is_scene {
         return Err(Failure::start("--seed is for scenes, and the source is a recording: leave it out"));

@@ -2,15 +2,16 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use messages::{Message, Sweep, Truth};
+use messages::{Message, Part, Sweep, Trace, Truth};
 use replay::{PacketWriter, PcapStamps, TableWriter};
 use serde_json::json;
 use simulator::Simulator;
+use tape::{About, Tape};
 use zerocopy::FromZeros;
 
 use crate::assets::Assets;
 use crate::cli::SimulateArgs;
-use crate::{Failure, sources};
+use crate::{Failure, sources, taping};
 
 /// Writes simulated sweeps to a file, and the truth beside it.
 pub(crate) fn simulate(args: &SimulateArgs) -> Result<(), Failure> {
@@ -18,7 +19,7 @@ pub(crate) fn simulate(args: &SimulateArgs) -> Result<(), Failure> {
     let assets = Assets::beside(None);
     let scene = sources::locate(&args.scene, &assets)?;
     let mut simulator = sources::scene(&scene, args.seed, &assets)?;
-    let mut out = Out::create(&args.out, &simulator)?;
+    let mut out = Out::create(args, &simulator, &assets)?;
     let truth_path = args.out.with_extension("truth.jsonl");
     let mut truths = BufWriter::new(create(&truth_path)?);
     let no_memory = |_| Failure::start("no memory for a sweep");
@@ -28,7 +29,7 @@ pub(crate) fn simulate(args: &SimulateArgs) -> Result<(), Failure> {
         sweep.clear();
         truth.clear();
         simulator.sweep(number, &mut sweep, &mut truth);
-        out.write(&sweep)?;
+        out.write(number, &sweep, &truth)?;
         writeln!(truths, "{}", truth_line(number, &truth)).map_err(|cause| failed(&truth_path, cause))?;
     }
     out.finish()?;
@@ -40,10 +41,23 @@ pub(crate) fn simulate(args: &SimulateArgs) -> Result<(), Failure> {
 enum Out {
     Packets(Box<PacketWriter<BufWriter<File>>>, PathBuf),
     Tables(TableWriter, PathBuf),
+    Messages(Box<Tape>),
 }
 
 impl Out {
-    fn create(path: &Path, simulator: &Simulator) -> Result<Self, Failure> {
+    fn create(args: &SimulateArgs, simulator: &Simulator, assets: &Assets) -> Result<Self, Failure> {
+        let path = args.out.as_path();
+        if path.extension().is_some_and(|extension| extension == "mcap") {
+            let about = About {
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                source: args.scene.display().to_string(),
+                sensor: simulator.scene().sensor().name().to_owned(),
+                sectors: 1,
+                ..About::default()
+            };
+            let tape = Tape::start(taping::settings_for_sweeps(assets)?, path, about, None, 0);
+            return Ok(Self::Messages(Box::new(tape.map_err(Failure::start)?)));
+        }
         if path.extension().is_some_and(|extension| extension == "pcap") {
             let file = BufWriter::new(create(path)?);
             let writer = PacketWriter::new(file, simulator.scene().sensor(), PcapStamps::Micros);
@@ -51,7 +65,7 @@ impl Out {
         }
         if path.extension().is_some() {
             return Err(Failure::start(format!(
-                "{}: must end in .pcap, or name a folder for CSV files",
+                "{}: must end in .pcap or .mcap, or name a folder for CSV files",
                 path.display()
             )));
         }
@@ -59,10 +73,19 @@ impl Out {
         Ok(Self::Tables(tables, path.to_owned()))
     }
 
-    fn write(&mut self, sweep: &Sweep) -> Result<(), Failure> {
+    fn write(&mut self, number: u64, sweep: &Sweep, truth: &Truth) -> Result<(), Failure> {
         match self {
             Self::Packets(writer, path) => writer.write(sweep).map_err(|cause| failed(path, cause)),
             Self::Tables(writer, path) => writer.write(sweep).map(drop).map_err(|cause| failed(path, cause)),
+            Self::Messages(tape) => {
+                let sensor_time_ns = sweep.header.sensor_time_ns;
+                let part = Part { ordinal: number, sweep: number, sectors: 1, sensor_time_ns, ..Part::default() };
+                let trace = Trace { part, ..Trace::default() };
+                // Nobody publishes these, so their time is the sensor's: the same scene gives the same file.
+                tape.sweep(sensor_time_ns, &trace, sweep);
+                tape.truth(sensor_time_ns, &trace, truth);
+                Ok(())
+            }
         }
     }
 
@@ -73,6 +96,7 @@ impl Out {
                 file.flush().map_err(|cause| failed(&path, cause))
             }
             Self::Tables(..) => Ok(()),
+            Self::Messages(mut tape) => tape.finish(0).map_err(Failure::run),
         }
     }
 }

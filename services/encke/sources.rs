@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lidar::{SensorFile, SensorModel};
-use replay::{Format, Options, Recording};
+use replay::{Format, Live, LiveAddress, Options, Recording};
 use runtime::SourcePlan;
 use simulator::{SceneFile, Simulator};
 
@@ -15,6 +15,18 @@ use crate::assets::Assets;
 pub(crate) enum Opened {
     Scene(Box<Simulator>),
     Recording(Box<Recording>),
+    Live(Box<Live>),
+}
+
+impl Opened {
+    /// Name of the sensor model that sweeps are made or read with.
+    pub(crate) fn sensor_name(&self) -> &str {
+        match self {
+            Self::Scene(simulator) => simulator.scene().sensor().name(),
+            Self::Recording(recording) => recording.sensor_name(),
+            Self::Live(live) => live.sensor_name(),
+        }
+    }
 }
 
 /// Whether a source is a scene: by its ending, since a scene is configuration, not data.
@@ -22,8 +34,17 @@ pub(crate) fn is_scene(from: &Path) -> bool {
     from.extension().is_some_and(|extension| extension == "toml")
 }
 
+/// The live sensor that a source names, if it is one.
+pub(crate) fn live(from: &Path) -> Result<Option<LiveAddress>, Failure> {
+    let from = from.to_string_lossy();
+    LiveAddress::is_one(&from).then(|| from.parse().map_err(Failure::start)).transpose()
+}
+
 /// The source as every process of the run can find it: an absolute path, or that of a scene in the configuration.
 pub(crate) fn locate(from: &Path, assets: &Assets) -> Result<PathBuf, Failure> {
+    if live(from)?.is_some() {
+        return Ok(from.to_owned());
+    }
     if from.exists() {
         return from.canonicalize().map_err(|cause| Failure::start(format!("{}: {cause}", from.display())));
     }
@@ -36,7 +57,8 @@ pub(crate) fn locate(from: &Path, assets: &Assets) -> Result<PathBuf, Failure> {
         return Ok(in_config.to_owned());
     }
     Err(Failure::start(format!(
-        "{}: no such file or folder, and no pattern that a file matches; --from takes a scene (.toml) or a recording",
+        "{}: no such file or folder, and no pattern that a file matches; --from takes a scene (.toml), a recording, \
+         or udp://ADDRESS:PORT",
         from.display()
     )))
 }
@@ -61,9 +83,14 @@ pub(crate) fn open(plan: &SourcePlan, assets: &Assets) -> Result<Opened, Failure
         min_range_m: plan.min_range_m,
         max_range_m: plan.max_range_m,
         repeat: plan.repeat,
-        ..Options::default()
+        topic: plan.topic.clone(),
+        both_returns: plan.both_returns,
     };
     let lookup = |name: &str| sensor(name, assets).map_err(Into::into);
+    if let Some(address) = live(&plan.from)? {
+        let live = replay::listen(&address, &options, &lookup, runtime::clock::utc_ns).map_err(Failure::start)?;
+        return Ok(Opened::Live(Box::new(live)));
+    }
     let recording = replay::open(&plan.from, &options, &lookup).map_err(Failure::start)?;
     Ok(Opened::Recording(Box::new(recording)))
 }

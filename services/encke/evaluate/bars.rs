@@ -50,6 +50,7 @@ pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
             match recording {
                 Opened::Scene(mut scene) => Claims::of(scene.as_mut(), sweeps, &plan.scene, &read, &judges),
                 Opened::Recording(mut recording) => Claims::of(recording.as_mut(), sweeps, &plan.scene, &read, &judges),
+                Opened::Live(_) => return Err(Failure::start("--from takes a recording, not a live sensor")),
             }
             .map_err(Failure::run)?,
         );

@@ -1,0 +1,169 @@
+//! The tape as a process of the chain: what it reads along, and what it says of the chain beside that.
+
+use std::path::PathBuf;
+
+use messages::{Clusters, Descriptors, Detections, Sweep, Trace, Truth};
+use runtime::{Pace, Plan, Shell, TAPE};
+use stage::{SinkError, Tap};
+use supervisor::Status;
+use tape::{About, Event, Level, Tape, TapeFile, Topic};
+use transport::Instance;
+
+use crate::Failure;
+use crate::assets::Assets;
+
+/// A tape with its place in an instance.
+pub(crate) struct Taping {
+    tape: Tape,
+    /// Whether clusters and descriptors are kept as they pass between the stages.
+    wants_between: (bool, bool),
+    instance: Instance,
+    counts_path: PathBuf,
+    before: Option<Status>,
+}
+
+/// The tape's settings, as `tape.toml` has them.
+pub(crate) fn settings(assets: &Assets) -> Result<tape::Settings, Failure> {
+    file(assets)?.checked().map_err(|cause| named(&cause))
+}
+
+/// Settings for simulated sweeps without a chain, in one file.
+pub(crate) fn settings_for_sweeps(assets: &Assets) -> Result<tape::Settings, Failure> {
+    let topics = vec![Topic::Sweep, Topic::RawSweep, Topic::Truth];
+    let file = TapeFile { topics, rotate_mib: 0, rotate_s: 0.0, quota_mib: 0, ..file(assets)? };
+    file.checked().map_err(|cause| named(&cause))
+}
+
+fn file(assets: &Assets) -> Result<TapeFile, Failure> {
+    let text = assets.text("tape.toml").map_err(Failure::start)?;
+    toml::from_str(&text).map_err(|cause| named(&cause))
+}
+
+fn named(cause: &dyn std::fmt::Display) -> Failure {
+    Failure::start(format!("tape.toml: {}", cause.to_string().trim_end()))
+}
+
+impl Taping {
+    /// Begins the recording of the shell's plan, or its next file where an earlier life had begun it.
+    pub(crate) fn start(shell: &Shell, assets: &Assets) -> Result<Self, Failure> {
+        let plan = shell.plan();
+        let Some(path) = &plan.outputs.record else {
+            return Err(Failure::start("the run records nothing: give it --record"));
+        };
+        let about = About {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            source: plan.source.from.display().to_string(),
+            sensor: plan.sensor.clone(),
+            sectors: plan.chain.sectors,
+            pace: if plan.pace == Pace::Fast { "fast" } else { "realtime" }.to_owned(),
+            instance: shell.instance().name().to_owned(),
+            deadline_ms: (plan.pace == Pace::Realtime).then_some(plan.chain.deadline_ms),
+        };
+        let resume = (shell.incarnation() > 1).then(|| shell.answered_sweeps());
+        let utc_ns = runtime::clock::utc_ns();
+        let settings = settings(assets)?;
+        let wants_between = (settings.has(Topic::RawClusters), settings.has(Topic::RawDescriptors));
+        let tape = Tape::start(settings, path, about, resume, utc_ns).map_err(Failure::start)?;
+        Ok(Self {
+            tape,
+            wants_between,
+            instance: shell.instance().clone(),
+            counts_path: Plan::counts_path(shell.instance(), shell.incarnation()),
+            before: None,
+        })
+    }
+
+    /// Notes the chain's state, and as events what has changed since the last time.
+    fn look_at_chain(&mut self, utc_ns: u64) {
+        // The supervisor may be taking the instance down.
+        let Ok(now) = supervisor::status(&self.instance) else { return };
+        if let Ok(json) = serde_json::to_vec(&now) {
+            self.tape.status(utc_ns, &json);
+        }
+        if let Some(before) = &self.before {
+            for (name, message) in changes(before, &now) {
+                self.tape.event(utc_ns, &Event { level: Level::Warning, name, message: &message });
+            }
+        }
+        self.before = Some(now);
+    }
+
+    fn save_counts(&self) {
+        let json = serde_json::to_vec(&self.tape.counts()).unwrap_or_default();
+        // A full disk costs the count, not the chain.
+        if let Err(error) = std::fs::write(&self.counts_path, json) {
+            tracing::error!(%error, "what was recorded could not be counted");
+        }
+    }
+}
+
+/// What is worth an event between two looks: its kind, and what happened.
+fn changes(before: &Status, now: &Status) -> Vec<(&'static str, String)> {
+    let mut found = Vec::new();
+    for (then, stage) in before.stages.iter().zip(&now.stages) {
+        if stage.restarts > then.restarts {
+            found.push(("restart", format!("{}: life {}", stage.stage, stage.restarts + 1)));
+        }
+        for (what, was, is) in [("dropped", then.dropped, stage.dropped), ("lost", then.lost, stage.lost)] {
+            if is > was {
+                found.push(("loss", format!("{}: {} parts {what}, {is} in all", stage.stage, is - was)));
+            }
+        }
+    }
+    if before.step != now.step {
+        found.push(("step", format!("from {} to {}", before.step, now.step)));
+    }
+    found
+}
+
+impl Tap for Taping {
+    fn sweep(&mut self, trace: &Trace, part: &Sweep, utc_ns: u64) {
+        self.tape.sweep(utc_ns, trace, part);
+    }
+
+    fn detections(&mut self, trace: &Trace, part: &Detections, utc_ns: u64) {
+        self.tape.detections(utc_ns, trace, part);
+    }
+
+    fn wants_between(&self) -> (bool, bool) {
+        self.wants_between
+    }
+
+    fn clusters(&mut self, trace: &Trace, part: &Clusters, utc_ns: u64) {
+        self.tape.clusters(utc_ns, trace, part);
+    }
+
+    fn descriptors(&mut self, trace: &Trace, part: &Descriptors, utc_ns: u64) {
+        self.tape.descriptors(utc_ns, trace, part);
+    }
+
+    fn truth(&mut self, trace: &Trace, truth: &Truth, utc_ns: u64) {
+        self.tape.truth(utc_ns, trace, truth);
+    }
+
+    fn missed(&mut self, message: &'static str, parts: u64) {
+        tracing::warn!(message, parts, "the tape was too slow: what is lost is counted by topic");
+        let message = format!("{parts} parts of {message} overflowed the queue");
+        self.tape.event(runtime::clock::utc_ns(), &Event { level: Level::Warning, name: TAPE, message: &message });
+    }
+
+    fn tick(&mut self, utc_ns: u64) {
+        self.look_at_chain(utc_ns);
+    }
+
+    fn checkpoint(&mut self, utc_ns: u64) {
+        self.tape.checkpoint(utc_ns);
+        self.save_counts();
+    }
+
+    fn done_sweeps(&mut self) -> u64 {
+        self.tape.done_sweeps()
+    }
+
+    fn finish(&mut self, utc_ns: u64) -> Result<(), SinkError> {
+        self.look_at_chain(utc_ns);
+        let finished = self.tape.finish(utc_ns);
+        self.save_counts();
+        finished.map_err(|cause| SinkError(cause.to_string()))
+    }
+}
