@@ -55,6 +55,29 @@ fn a_rate_is_kept() {
 }
 
 #[test]
+fn a_sweep_at_a_time_the_bytes_are_the_same_and_nothing_comes_unasked() {
+    let scene = ["--from", "config/scenes/default.toml", "--sweeps", "3"];
+    let fast = Run::new(&[&scene[..], &["--pace", "fast"]].concat()).finish().expect_code(0);
+    let run = Run::new(&[&scene[..], &["--pace", "step"]].concat());
+    let child = run.start();
+    run.wait_for(|status| status["stages"][0]["state"] == "running");
+    let step = |sweep| {
+        assert_eq!(run.answered(), sweep);
+        let step = support::encke().args(["ctl", "step", "--instance", &run.instance]).status().unwrap();
+        assert!(step.success());
+        run.wait_for(|_| run.answered() > sweep);
+    };
+    step(0);
+    // Longer than the supervisor's patience with a chain in which nothing moves.
+    std::thread::sleep(std::time::Duration::from_secs(6));
+    step(1);
+    let step = support::encke().args(["ctl", "step", "--instance", &run.instance]).status().unwrap();
+    assert!(step.success());
+    let run = run.collect(child).expect_code(0);
+    assert!(run.bytes == fast.bytes);
+}
+
+#[test]
 fn on_one_core_the_bytes_are_those_of_all_cores() {
     let args = ["--from", "config/scenes/default.toml", "--sweeps", "20", "--pace", "fast"];
     let all = Run::new(&args).with_labels().finish().expect_code(0);

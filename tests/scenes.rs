@@ -115,6 +115,22 @@ fn a_capture_of_a_scene_gives_the_same_classes_as_the_scene() {
 }
 
 #[test]
+fn messages_of_a_scene_give_the_bytes_of_the_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = "config/scenes/default.toml";
+    let direct = Run::new(&["--from", scene, "--sweeps", "4", "--pace", "fast"]).finish().expect_code(0);
+    let files = [dir.path().join("one.mcap"), dir.path().join("other.mcap")];
+    for file in &files {
+        let made = encke().args(["simulate", "--scene", scene, "--sweeps", "4", "--out"]).arg(file).output().unwrap();
+        assert!(made.status.success(), "{}", text(&made.stderr));
+        let replayed = Run::new(&["--from", file.to_str().unwrap(), "--pace", "fast"]).finish().expect_code(0);
+        assert!(replayed.bytes == direct.bytes);
+    }
+    let [one, other] = files.map(|file| std::fs::read(file).unwrap());
+    assert!(one == other, "the same scene gives the same file");
+}
+
+#[test]
 fn a_full_disk_costs_rows_and_not_the_chain() {
     let args = ["run", "--sweeps", "5", "--pace", "fast", "--detections", "/dev/full", "--json"];
     let output = encke().args(args).output().unwrap();

@@ -44,8 +44,13 @@ impl Run {
     }
 
     /// Also writes labels.
-    pub fn with_labels(mut self) -> Self {
-        self.args.extend(["--labels".to_owned(), self.dir.path().join("l.csv").display().to_string()]);
+    pub fn with_labels(self) -> Self {
+        self.with_file("--labels", "l.csv")
+    }
+
+    /// Also writes another file into the run's folder.
+    pub fn with_file(mut self, flag: &str, file: &str) -> Self {
+        self.args.extend([flag.to_owned(), self.dir.path().join(file).display().to_string()]);
         self
     }
 
@@ -70,7 +75,12 @@ impl Run {
     }
 
     /// Waits for its end and reads what it left.
-    pub fn collect(self, mut child: Child) -> Finished {
+    pub fn collect(self, child: Child) -> Finished {
+        self.collect_and_keep(child).0
+    }
+
+    /// The same, and gives the folder with all that it wrote.
+    pub fn collect_and_keep(self, mut child: Child) -> (Finished, tempfile::TempDir) {
         // A run that hangs is a failure, not a long test. Its output fits into the pipes.
         let mut looks = 0;
         while child.try_wait().unwrap().is_none() {
@@ -90,7 +100,7 @@ impl Run {
         let labels = String::from_utf8(read("l.csv")).unwrap();
         let left = leftovers(&self.instance);
         assert!(left.is_empty(), "left in shared memory or on disk: {left:?}");
-        Finished { output, report, detections, bytes, labels }
+        (Finished { output, report, detections, bytes, labels }, self.dir)
     }
 
     /// Waits until the source has sent so many sweeps.
