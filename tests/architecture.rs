@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Bottom to top: a crate of `shared/` may use only those before it.
-const LAYERS: [&str; 6] = ["lidar", "messages", "stage", "chain", "transport", "runtime"];
+const LAYERS: [&str; 7] = ["lidar", "messages", "stage", "events", "chain", "transport", "runtime"];
 /// Rooms without IPC, clock, thread, file or log.
 const PURE: [&str; 4] = ["simulator", "clusterer", "extractor", "classifier"];
 /// What a pure room must not depend on.

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use chain::executive::{Executive, ExecutiveFile};
 use chain::{Chain, ChainFile};
 use runtime::{Outputs, Plan, SourcePlan};
 use supervisor::{Report, Settings};
@@ -74,6 +75,8 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
     };
     Ok(Plan {
         supervisor_pid: std::process::id(),
+        executive: executive(&chain, assets)?,
+        generation: 0,
         parameters,
         source: SourcePlan {
             from,
@@ -154,4 +157,11 @@ fn chain(args: &RunArgs, assets: &Assets) -> Result<Chain, Failure> {
     }
     let chain = file.checked().map_err(named)?;
     Ok(chain)
+}
+
+/// What is watched while the chain runs: `executive.toml` beside the chain's file.
+pub(crate) fn executive(chain: &Chain, assets: &Assets) -> Result<Executive, Failure> {
+    let text = assets.text("executive.toml").map_err(Failure::start)?;
+    let table = ExecutiveFile::parse(&text).and_then(|file| file.checked(chain));
+    table.map_err(|cause| Failure::start(format!("executive.toml: {cause}")))
 }

@@ -64,11 +64,13 @@ pub enum Verdict {
     RejectedDouble = 8,
     /// At the sink: a part before it is missing, or was without what came before it; both will be sent again.
     RejectedAhead = 9,
+    /// The stage could not be kept running: a stand-in answers for it.
+    RejectedDown = 10,
 }
 
 impl Verdict {
     /// All verdicts, by their number.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Complete,
         Self::PartialCells,
         Self::RejectedIncomplete,
@@ -79,6 +81,7 @@ impl Verdict {
         Self::RejectedShed,
         Self::RejectedDouble,
         Self::RejectedAhead,
+        Self::RejectedDown,
     ];
 
     /// Whether the part counts as rejected in the ledger.
@@ -92,6 +95,7 @@ impl Verdict {
                 | Self::RejectedShed
                 | Self::RejectedDouble
                 | Self::RejectedAhead
+                | Self::RejectedDown
         )
     }
 
@@ -108,6 +112,7 @@ impl Verdict {
             Self::RejectedShed => "shed",
             Self::RejectedDouble => "double",
             Self::RejectedAhead => "ahead",
+            Self::RejectedDown => "down",
         }
     }
 }

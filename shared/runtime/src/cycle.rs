@@ -92,6 +92,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             page.counted_parts.add(1);
         }
         arrivals.free_ns = clock::now_ns();
+        page.sent_ns.set(arrivals.free_ns);
         Ok(())
     }
 }

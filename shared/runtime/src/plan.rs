@@ -3,6 +3,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use chain::Chain;
+use chain::executive::Executive;
 use serde::{Deserialize, Serialize};
 use transport::Instance;
 
@@ -21,6 +22,10 @@ pub struct Plan {
     pub supervisor_pid: u32,
     /// The topology.
     pub chain: Chain,
+    /// What is watched while it runs, and what is done about it.
+    pub executive: Executive,
+    /// Generation of `parameters` and `executive`: how often they were replaced while the chain ran.
+    pub generation: u64,
     /// Text of each stage's parameter file, by the stage's name.
     pub parameters: BTreeMap<String, String>,
     /// Where sweeps come from.
@@ -123,6 +128,11 @@ impl Plan {
     /// Where the sink keeps the statistics of one of its lives.
     pub fn snapshot_path(instance: &Instance, incarnation: u32) -> PathBuf {
         instance.dir().join(format!("statistics.{incarnation}.json"))
+    }
+
+    /// Where the supervisor writes what happens.
+    pub fn events_path(instance: &Instance) -> PathBuf {
+        instance.dir().join("events.jsonl")
     }
 
     /// Where the tape keeps what one of its lives has written.

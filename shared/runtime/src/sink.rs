@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use messages::Trace;
 use stage::{Settled, Sink};
 use transport::Taken;
 
@@ -36,6 +37,19 @@ struct End<'a, K: Sink> {
     checkpoint_ns: u64,
 }
 
+impl<K: Sink> End<'_, K> {
+    /// Notes when a sweep ended here, and how long after its last return it had left the last stage.
+    fn note(&self, trace: &Trace) {
+        let (page, now_ns) = (&self.shell.page, clock::now_ns());
+        page.sent_ns.set(now_ns);
+        if trace.part.is_last() {
+            let sent_ns = trace.hops().last().map_or(now_ns, |hop| hop.finished_ns);
+            page.latency_ns.set(sent_ns.saturating_sub(trace.due_ns));
+            page.answered_ns.set(now_ns);
+        }
+    }
+}
+
 impl<K: Sink> Reader<K::Input> for End<'_, K> {
     /// One part: receive → in hand → accept → counted → out of hand → release. Settled comes later, from the sink.
     fn take(&mut self, taken: &Taken<K::Input>) -> Result<(), ShellError> {
@@ -45,6 +59,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
             self.shell.page.count_accepted(verdict);
             self.shell.page.wanted_attempt.set(self.sink.wanted_attempt().into());
             self.shell.page.put_down();
+            self.note(taken.trace());
         }
         Ok(())
     }

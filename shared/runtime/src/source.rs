@@ -165,8 +165,12 @@ impl<'a> Out<'a> {
             self.pacer.start_ns(header.sensor_time_ns, began_ns)
         };
         made.began_ns = began_ns;
-        // One step for the whole sweep. At --pace fast results do not depend on how busy the machine is.
-        made.step = if plan.pace == Pace::Realtime { self.shell.page.step.get() as u32 } else { 0 };
+        if plan.pace == Pace::Realtime {
+            self.shell.page.period_ns.set(self.pacer.host_ns(header.period_ns));
+        }
+        // One step for the whole sweep. At --pace fast the ladder stands still, so that results do not depend on how busy the
+        // machine is.
+        made.step = self.shell.page.step.get() as u32;
         self.kept.keep();
         Ok(true)
     }
@@ -257,6 +261,8 @@ impl<'a> Out<'a> {
         page.put_down();
         self.free_ns = clock::now_ns();
         page.beat(self.free_ns);
+        page.sent_ns.set(self.free_ns);
+        page.step_sent.set(self.trace.part.step.into());
         Ok(())
     }
 

@@ -5,10 +5,12 @@
 
 mod ledger;
 mod map;
+mod ring;
 mod view;
 mod words;
 
 pub use ledger::{Gap, GapKind, Settlement};
 pub use map::PageMap;
+pub use ring::{Heard, Said};
 pub use view::{Counts, PageView};
-pub use words::{Page, State};
+pub use words::{Page, State, Tier};

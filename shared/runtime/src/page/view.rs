@@ -47,6 +47,30 @@ pub struct Counts {
     pub late: u64,
     /// Source only: number of the step of degradation for the next sweep.
     pub step: u64,
+    /// Host time at which the last part was published (a sink: accepted) [ns].
+    pub sent_ns: u64,
+    /// Source only: host time from one sweep to the next [ns]; 0 where nothing paces it.
+    pub period_ns: u64,
+    /// Source only: 1 while it stands still because it was told to.
+    pub paused: u64,
+    /// Sink only: host time at which the last sweep came to its end [ns].
+    pub answered_ns: u64,
+    /// Sink only: of that sweep, from its last return to its last detection sent [ns].
+    pub latency_ns: u64,
+    /// A [`super::Tier`]: which build of the stage its process is.
+    pub tier: u64,
+    /// Generation of the parameters in use.
+    pub table_active: u64,
+    /// The supervisor's page: a [`chain::Mode`].
+    pub mode: u64,
+    /// The supervisor's page: changes of mode so far.
+    pub mode_changes: u64,
+    /// The supervisor's page: those that did not take effect within two sweeps.
+    pub modes_late: u64,
+    /// The supervisor's page: commands carried out.
+    pub commands_accepted: u64,
+    /// The supervisor's page: commands refused.
+    pub commands_refused: u64,
 }
 
 impl Counts {
@@ -85,6 +109,18 @@ impl PageView {
             slips: page.slips.get(),
             late: page.late.get(),
             step: page.step.get(),
+            sent_ns: page.sent_ns.get(),
+            period_ns: page.period_ns.get(),
+            paused: page.paused.get(),
+            answered_ns: page.answered_ns.get(),
+            latency_ns: page.latency_ns.get(),
+            tier: page.tier.get(),
+            table_active: page.table_active.get(),
+            mode: page.mode.get(),
+            mode_changes: page.mode_changes.get(),
+            modes_late: page.modes_late.get(),
+            commands_accepted: page.commands_accepted.get(),
+            commands_refused: page.commands_refused.get(),
         }
     }
 }

@@ -2,8 +2,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use messages::Verdict;
 
+use super::ring::Rings;
+
 /// Told apart from any other file, and from pages of another layout.
-pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg3");
+pub(super) const MAGIC: u64 = u64::from_le_bytes(*b"enckepg4");
 
 /// Gaps whose ordinals are kept by name; older ones are overwritten, their counts stay.
 pub(super) const MAX_GAPS: usize = 128;
@@ -34,6 +36,39 @@ impl State {
             Self::Running => "running",
             Self::Ended => "ended",
             Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// Which build of a stage a process is: less trusted parts are left out one after the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u64)]
+pub enum Tier {
+    /// As configured.
+    #[default]
+    Configured = 0,
+    /// With the parameters and models that are built in.
+    BuiltIn = 1,
+    /// Nothing of the stage: every part passes empty, rejected as `down`.
+    StandIn = 2,
+}
+
+impl Tier {
+    /// The tier of a number; the last one for numbers beyond.
+    pub fn from_number(number: u64) -> Self {
+        match number {
+            0 => Self::Configured,
+            1 => Self::BuiltIn,
+            _ => Self::StandIn,
+        }
+    }
+
+    /// The tier's word in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Configured => "configured",
+            Self::BuiltIn => "built-in",
+            Self::StandIn => "stand-in",
         }
     }
 }
@@ -141,6 +176,23 @@ pub struct Page {
     pub slips: Word,
     /// Sweeps whose last part left the stage after the deadline.
     pub late: Word,
+    /// Host time at which the last part was published (a sink: accepted) [ns].
+    pub sent_ns: Word,
+    /// Source only: host time from one sweep to the next [ns]; 0 before the first, and where nothing paces it.
+    pub period_ns: Word,
+    /// Source only: number of the step of degradation of the sweep under way.
+    pub step_sent: Word,
+    /// Source only: 1 while it stands still because it was told to.
+    pub paused: Word,
+    /// Sink only: host time at which the last sweep came to its end here [ns].
+    pub answered_ns: Word,
+    /// Sink only: of that sweep, from its last return to its last detection sent [ns].
+    pub latency_ns: Word,
+    /// Generation of the parameters in use.
+    pub table_active: Word,
+    /// Generation of the parameters that were refused last.
+    pub table_refused: Word,
+    pub(super) rings: Rings,
     /// Heap allocations inside `process` after warm-up.
     pub process_allocations: Word,
     /// Heap allocations of the shell round it after warm-up.
@@ -165,6 +217,30 @@ pub struct Page {
     pub may_start: Word,
     /// Source only: number of the step of degradation at which the next sweep is to be processed.
     pub step: Word,
+    /// Source only: 1 while it is to stand still between two sweeps.
+    pub pause: Word,
+    /// A [`Tier`]: which build of the stage the next life is.
+    pub tier: Word,
+    /// Generation of the parameters in the plan; where it is higher than `table_active` the stage reads the plan again.
+    pub table_wanted: Word,
+    /// The first sweep that is to be processed with them.
+    pub table_from_sweep: Word,
+
+    // The supervisor's own page.
+    /// A [`chain::Mode`].
+    pub mode: Word,
+    /// Host time at which the mode was asked for [ns].
+    pub mode_asked_ns: Word,
+    /// Host time from then until it was in effect [ns]; 0 while it is not.
+    pub mode_took_ns: Word,
+    /// Changes of mode so far.
+    pub mode_changes: Word,
+    /// Changes that did not take effect within two sweeps.
+    pub modes_late: Word,
+    /// Commands carried out.
+    pub commands_accepted: Word,
+    /// Commands refused.
+    pub commands_refused: Word,
 
     // Written by `encke ctl`.
     /// Source only: sweeps asked for, where each waits for that.
@@ -175,6 +251,12 @@ pub struct Page {
     pub swallow: Word,
     /// Time added to the work on each sweep [ns].
     pub slow_ns: Word,
+    /// Number of a fault for the shell to have; 0 = none.
+    pub fault: Word,
+    /// What more there is to say about it.
+    pub fault_argument: Word,
+    /// How often it is still to be had; counts down.
+    pub fault_left: Word,
 }
 
 impl Page {
