@@ -43,6 +43,9 @@ pub enum SupervisorError {
     /// The runtime failed.
     #[error(transparent)]
     Shell(#[from] runtime::ShellError),
+    /// The log of the run cannot be written.
+    #[error(transparent)]
+    Log(#[from] events::LogError),
     /// Shared memory failed.
     #[error(transparent)]
     Transport(#[from] transport::TransportError),

@@ -2,7 +2,8 @@ use std::time::Duration;
 
 use chain::SUPERVISOR;
 use crossbeam_channel::{Receiver, bounded, select, tick};
-use runtime::page::State;
+use events::{CHAIN, EventId, Log};
+use runtime::page::{PageMap, State};
 use runtime::realtime::{self, AsBefore};
 use runtime::{Pace, Plan, clock};
 use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
@@ -83,6 +84,9 @@ pub(crate) struct Watch<'a> {
     pub(crate) spawn: bool,
     pub(crate) stages: Vec<Watched>,
     pub(crate) tape: Option<Tape>,
+    /// The supervisor's own page.
+    pub(crate) page: PageMap,
+    pub(crate) log: Log,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
     pub(crate) node: Node,
@@ -119,6 +123,9 @@ impl<'a> Watch<'a> {
         let stages =
             (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
         let tape = Tape::new(instance, plan, spawn)?;
+        let page = PageMap::create(&Plan::page_path(instance, SUPERVISOR))?;
+        page.pid.set(u64::from(std::process::id()));
+        let log = Log::create(&Plan::events_path(instance))?;
         plan.write(instance)?;
         let now_ns = clock::now_ns();
         let mut watch = Self {
@@ -127,6 +134,8 @@ impl<'a> Watch<'a> {
             spawn,
             stages,
             tape,
+            page,
+            log,
             services,
             node,
             signals,
@@ -170,6 +179,7 @@ impl<'a> Watch<'a> {
             self.await_up(0)?;
         }
         self.begun = true;
+        self.say(EventId::RunBegan, CHAIN, "all processes are up");
         self.take_seat();
         Ok(())
     }
