@@ -5,6 +5,7 @@ use crate::Failure;
 
 /// The running instance of this name, or the only one.
 pub(crate) fn find(name: Option<&str>) -> Result<(Instance, Running), Failure> {
+    Instance::check_base_dir().map_err(Failure::start)?;
     let name = match name {
         Some(name) => name.to_owned(),
         None => only_one()?,

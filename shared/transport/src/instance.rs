@@ -1,5 +1,5 @@
 use std::fs;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 /// Longest name of an instance. Sockets lie below its folder, and a socket's path has at most 107 bytes.
@@ -31,7 +31,10 @@ pub enum InstanceError {
     )]
     TooLong(PathBuf),
     /// The folder belongs to somebody else, or others may enter it.
-    #[error("{path} belongs to uid {owner} with mode {mode:o}, must belong to uid {uid} with mode 700: remove it")]
+    #[error(
+        "{path} belongs to uid {owner} with mode {mode:o}, must belong to uid {uid} with mode 700: run as that user, or set \
+         XDG_RUNTIME_DIR to a folder of your own"
+    )]
     NotPrivate {
         /// The folder.
         path: PathBuf,
@@ -59,6 +62,16 @@ impl Instance {
             Some(dir) if dir.is_absolute() && dir.is_dir() => dir.join("encke"),
             _ => PathBuf::from(format!("/tmp/encke-{}", rustix::process::getuid().as_raw())),
         }
+    }
+
+    /// Checks that the folder of instances, where there is one, is this user's own.
+    ///
+    /// # Errors
+    /// It belongs to somebody else, or others may enter it: what lies there cannot be trusted, and is not ours to command.
+    pub fn check_base_dir() -> Result<(), InstanceError> {
+        let base = Self::base_dir();
+        // Whoever may not even look at it sees the same as where there is none; that is said when it is made.
+        if fs::symlink_metadata(&base).is_ok() { check_private(&base) } else { Ok(()) }
     }
 
     /// The instance of this name below [`Instance::base_dir`]; touches nothing.
@@ -131,6 +144,18 @@ impl Instance {
         let entries = fs::read_dir(SHARED_MEMORY_DIR).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
         names.filter(|name| name.starts_with(&self.any_prefix())).collect()
+    }
+
+    /// Takes from others what iceoryx2 gives them: it makes the objects of a node's management for everybody to write.
+    pub(crate) fn make_shared_memory_private(&self) {
+        for name in self.shared_memory() {
+            let path = Path::new(SHARED_MEMORY_DIR).join(name);
+            let is_open = fs::metadata(&path).is_ok_and(|meta| meta.mode() & 0o077 != 0);
+            if is_open {
+                // Whoever made it may have removed it meanwhile.
+                let _ = fs::set_permissions(&path, fs::Permissions::from_mode(0o600));
+            }
+        }
     }
 
     /// Removes the folder and everything of the instance in shared memory. No process of it may be alive.

@@ -70,6 +70,7 @@ impl Node {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Ipc>()
             .map_err(|e| fail(&e))?;
+        instance.make_shared_memory_private();
         Ok(Self { node, queue_parts })
     }
 
