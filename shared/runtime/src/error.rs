@@ -15,6 +15,9 @@ pub enum ShellError {
     /// The instance did not come up within the time that a stage waits for it.
     #[error("instance {0:?} has no supervisor: start one with `encke run --instance {0}`")]
     NoInstance(String),
+    /// Another process of the same stage lives.
+    #[error("{0}: another process of this stage is running; there may be one")]
+    Taken(String),
     /// The supervisor has not settled the account of this stage's last life.
     #[error("{0}: its supervisor does not answer for its last life; is it running?")]
     Unsettled(String),

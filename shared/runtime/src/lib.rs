@@ -8,6 +8,7 @@ pub mod clock;
 mod cycle;
 mod deadline;
 mod error;
+mod guardian;
 mod kept;
 pub mod logging;
 mod pacer;

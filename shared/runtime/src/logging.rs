@@ -27,6 +27,8 @@ pub fn install(default_level: &str) {
         .with_ansi(false)
         .with_target(false)
         .with_timer(HostTime)
+        // It would say on stderr that stderr is gone, and end a process whose terminal closed.
+        .log_internal_errors(false)
         .finish();
     // Only tests install twice; the first stays.
     let _ = tracing::subscriber::set_global_default(subscriber);

@@ -1,8 +1,11 @@
+use std::fs::File;
 use std::time::Duration;
 
 use messages::Part;
+use rustix::fs::{FlockOperation, flock};
 use transport::{Instance, Node};
 
+use crate::guardian::Guardian;
 use crate::page::{PageMap, State};
 use crate::{Plan, ShellError, Shutdown, clock};
 
@@ -27,6 +30,9 @@ pub struct Shell {
     pub(crate) page: PageMap,
     pub(crate) incarnation: u32,
     pub(crate) shutdown: Shutdown,
+    guardian: Guardian,
+    /// Held as long as this life lasts: there are never two of a stage.
+    _place: File,
     pub(crate) allocations: AllocationCount,
 }
 
@@ -42,7 +48,14 @@ impl Shell {
     /// Begins a life of stage `name`: its predecessor's account is settled, its page is this process's from here on.
     pub fn enter(instance: Instance, plan: Plan, name: &str, allocations: AllocationCount) -> Result<Self, ShellError> {
         let shutdown = Shutdown::install(plan.supervisor_pid)?;
-        let page = PageMap::open(&Plan::page_path(&instance, name))?;
+        let guardian = Guardian::of(&instance, &plan, name)?;
+        let path = Plan::page_path(&instance, name);
+        let page = PageMap::open(&path)?;
+        let place = File::open(&path).map_err(|cause| ShellError::File { path, cause: cause.to_string() })?;
+        let is_free = || flock(&place, FlockOperation::NonBlockingLockExclusive).is_ok();
+        if !clock::wait_for(PATIENCE_NS, || is_free() || shutdown.asked()) || !is_free() {
+            return Err(ShellError::Taken(name.to_owned()));
+        }
         let before = page.incarnation.get();
         let settled = || page.settled_incarnation.get() == before;
         if !clock::wait_for(PATIENCE_NS, || settled() || shutdown.asked()) || !settled() {
@@ -61,6 +74,8 @@ impl Shell {
             page,
             incarnation: before as u32 + 1,
             shutdown,
+            guardian,
+            _place: place,
             allocations,
         })
     }
@@ -105,9 +120,9 @@ impl Shell {
         }
     }
 
-    /// Whether it is time to leave: asked to, or nobody is left to ask.
+    /// Whether it is time to leave: asked to, or nobody has been left to ask for too long.
     pub(crate) fn leaving(&self) -> bool {
-        self.shutdown.asked() || self.shutdown.orphaned()
+        self.shutdown.asked() || self.guardian.abandoned()
     }
 
     pub(crate) fn left(&self) {

@@ -176,7 +176,7 @@ impl<'a> Out<'a> {
     }
 
     /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep
-    /// that has begun is sent to its end, unless the window stays shut or the supervisor is gone.
+    /// that has begun is sent to its end, unless the window stays shut.
     fn send(&mut self) -> Result<bool, ShellError> {
         let shell = self.shell;
         if shell.plan.source.single_step && self.is_between_sweeps() {
@@ -218,7 +218,7 @@ impl<'a> Out<'a> {
         self.trace = Trace { part, due_ns, sweep_start_ns: made.start_ns, ..Trace::default() };
         // What was taken while it was made is the sweep's own time; only its time to leave counts.
         self.taken_by_others.lap_ns();
-        self.wait_until(due_ns, || shell.shutdown.orphaned() || (sector == 0 && shell.leaving()));
+        self.wait_until(due_ns, || sector == 0 && shell.leaving());
         if clock::now_ns() < due_ns {
             shell.page.put_down();
             return Ok(false);

@@ -118,6 +118,11 @@ impl Instance {
         &self.dir
     }
 
+    /// The lock that the instance's supervisor holds as long as it lives, stopped or not; the kernel releases it.
+    pub fn lock_path(&self) -> PathBuf {
+        self.dir.join("lock")
+    }
+
     /// The iceoryx2 configuration that all processes of the instance read (and `iox2 --config` may).
     pub fn config_path(&self) -> PathBuf {
         self.dir.join("iceoryx2.toml")

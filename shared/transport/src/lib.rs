@@ -20,6 +20,6 @@ pub use bill::Segment;
 pub use error::TransportError;
 pub use inlet::{Inlet, Taken};
 pub use instance::{Instance, InstanceError, MAX_NAME_LEN};
-pub use node::{Node, ServiceHold};
+pub use node::{Node, Reopened, ServiceHold};
 pub use outlet::{Loan, Outlet};
 pub use tap::Tap;

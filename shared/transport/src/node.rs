@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use iceoryx2::config::ConfigCreationError;
-use iceoryx2::node::CleanupState;
+use iceoryx2::node::{CleanupState, NodeState, NodeView};
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use messages::Message;
@@ -31,7 +31,31 @@ pub struct ServiceHold {
     wake: Box<dyn Fn()>,
 }
 
+/// A service that is open again, without the right to wake its readers: so many may have that at once, and the dead count
+/// until they are cleaned away.
+pub struct Reopened {
+    hold: Box<dyn FnOnce() -> Result<ServiceHold, TransportError>>,
+}
+
+impl Reopened {
+    /// Takes the right to wake the readers.
+    pub fn hold(self) -> Result<ServiceHold, TransportError> {
+        (self.hold)()
+    }
+}
+
 impl ServiceHold {
+    fn new<T: Message>(topic: Topic<T>, wakeups: Wakeups) -> Result<Self, TransportError> {
+        let notifier = wakeups.notifier_builder().create();
+        let notifier = notifier.map_err(|e| TransportError::new("signal", T::TYPE, e))?;
+        let wake = Box::new(move || {
+            let _kept = (&topic, &wakeups);
+            // A listener that is gone needs no waking.
+            let _ = notifier.notify();
+        });
+        Ok(Self { wake })
+    }
+
     /// Wakes the readers of the topic without a message.
     pub fn wake(&self) {
         (self.wake)();
@@ -101,13 +125,14 @@ impl Node {
             .max_nodes(MAX_NODES)
             .create()
             .map_err(|e| fail(&e))?;
-        let notifier = wakeups.notifier_builder().create().map_err(|e| fail(&e))?;
-        let wake = Box::new(move || {
-            let _kept = (&topic, &wakeups);
-            // A listener that is gone needs no waking.
-            let _ = notifier.notify();
-        });
-        Ok(ServiceHold { wake })
+        ServiceHold::new(topic, wakeups)
+    }
+
+    /// Opens the service of a message type that a supervisor before this one created. It is held open from here on, and
+    /// can wake readers once [`Reopened::hold`] was called.
+    pub fn reopen<T: Message>(&self) -> Result<Reopened, TransportError> {
+        let (topic, wakeups) = self.open::<T>()?;
+        Ok(Reopened { hold: Box::new(move || ServiceHold::new(topic, wakeups)) })
     }
 
     /// Opens the writing end of a service.
@@ -140,6 +165,24 @@ impl Node {
             .map_err(|e| fail(&e))?;
         let wakeups = self.node.service_builder(&name).event().open().map_err(|e| fail(&e))?;
         Ok((topic, wakeups))
+    }
+
+    /// Frees what dead processes held that had joined as `name`; the other dead keep what they sent. Returns how many were
+    /// cleaned and how many could not be.
+    pub fn clean_dead_of(&self, name: &str) -> (u64, u64) {
+        let (mut cleaned, mut uncleaned) = (0, 0);
+        let clean = |state| {
+            if let NodeState::Dead(dead) = state
+                && dead.details().as_ref().is_some_and(|details| details.name().as_str() == name)
+            {
+                let count = if dead.try_remove_stale_resources().is_ok() { &mut cleaned } else { &mut uncleaned };
+                *count += 1;
+            }
+            CallbackProgression::Continue
+        };
+        // A list that cannot be read is as good as an empty one: what is left goes with the instance.
+        let _ = iceoryx2::node::Node::<Ipc>::list(self.node.config(), clean);
+        (cleaned, uncleaned)
     }
 
     /// Frees what dead processes of the instance held. The supervisor's alone, and only after the readers of a dead

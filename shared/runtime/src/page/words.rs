@@ -226,7 +226,9 @@ pub struct Page {
     /// The first sweep that is to be processed with them.
     pub table_from_sweep: Word,
 
-    // The supervisor's own page.
+    // The supervisor's own page. Its `incarnation` counts the supervisors that the run has had.
+    /// Host time at which the run began [ns].
+    pub run_began_ns: Word,
     /// A [`chain::Mode`].
     pub mode: Word,
     /// Host time at which the mode was asked for [ns].
