@@ -172,8 +172,8 @@ macro_rules! catalogue {
 }
 
 use EventId::{
-    ChainRestarted, ClockStep, CommandRefused, EventsUnread, FileFailed, SafeEntered, SharedMemoryGone, StageDied,
-    StageHung, StageSilent, StageSlow, StageSpinning, StepTaken, SupervisorAdopted,
+    ClockStep, CommandRefused, EventsUnread, FileFailed, SafeEntered, SharedMemoryGone, StageDied, StageHung,
+    StageSlow, StageSpinning, StepTaken, SupervisorAdopted,
 };
 use Lasting::{Once, Open, Time, Times};
 
@@ -212,7 +212,7 @@ catalogue! {
         "A sweep without a return.";
     OnePoint = 111, "one-point", Source, None, Times(1), "", None, "answered",
         "A sweep of a single return.";
-    AllNan = 112, "all-nan", Source, None, Times(1), "", None, "answered or rejected as malformed",
+    AllNan = 112, "all-nan", Source, None, Times(1), "", None, "rejected as malformed; the next one is answered",
         "A sweep of which no coordinate is a number.";
     DuplicatePoints = 113, "duplicate-points", Source, None, Times(1), "", None, "answered",
         "A sweep with each return twice.";

@@ -14,10 +14,14 @@
 
 mod campaign;
 mod catalogue;
+mod corrupt;
+mod corrupted;
 mod planned;
 mod schedule;
 
 pub use campaign::{Campaign, CampaignError, CampaignFile, Spacing};
 pub use catalogue::{CATALOGUE, Entry, FOR_EVER, Fault, Lasting, Strength, Target, Unit};
+pub use corrupt::Corruptor;
+pub use corrupted::{Corrupted, Held};
 pub use planned::{PlanError, Planned};
 pub use schedule::schedule;

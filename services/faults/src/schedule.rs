@@ -46,7 +46,7 @@ fn pick<'a>(kinds: &'a [Kind], rng: &mut ChaCha8Rng) -> Option<&'a Kind> {
         place -= kind.weight;
         place < 0.0
     });
-    found.or(weighty().last())
+    found.or(weighty().next_back())
 }
 
 fn planned(kind: &Kind, rng: &mut ChaCha8Rng, at_s: f64) -> Planned {
