@@ -123,13 +123,19 @@ fn what_a_killed_supervisor_leaves_is_removed() {
     let stages = run.status().unwrap()["stages"].as_array().unwrap().clone();
     child.kill().unwrap();
     child.wait().unwrap();
-    // The next chain, whatever its name, cleans up.
+    // The next chain, whatever its name, leaves alone what lives and cleans up after the dead.
+    Run::new(&["--sweeps", "2", "--pace", "fast"]).finish().expect_code(0);
+    for stage in &stages {
+        let line = std::fs::read(format!("/proc/{}/cmdline", stage["pid"])).unwrap();
+        assert!(support::text(&line).contains(&run.instance), "a stage did not wait to be adopted: {stage}");
+        support::kill(stage["pid"].as_u64().unwrap());
+    }
+    for stage in stages {
+        let path = format!("/proc/{}/cmdline", stage["pid"]);
+        assert!(clock::wait_for(5_000_000_000, || std::fs::read(&path).unwrap_or_default().is_empty()));
+    }
     Run::new(&["--sweeps", "2", "--pace", "fast"]).finish().expect_code(0);
     assert!(support::leftovers(&run.instance).is_empty());
-    for stage in stages {
-        let line = std::fs::read(format!("/proc/{}/cmdline", stage["pid"])).unwrap_or_default();
-        assert!(!support::text(&line).contains(&run.instance), "a stage outlived its supervisor: {stage}");
-    }
 }
 
 /// Kills of each stage in the test below; `ENCKE_KILLS=50` makes a campaign of it.

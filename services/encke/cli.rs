@@ -145,6 +145,9 @@ pub(crate) struct RunArgs {
     /// Supervise stages that somebody else starts.
     #[arg(long)]
     pub(crate) no_spawn: bool,
+    /// If the instance's supervisor died and its stages go on with the same options, take them over; else start as usual.
+    #[arg(long, requires = "instance")]
+    pub(crate) adopt: bool,
     /// Exit 1 on any deadline miss, drop or loss.
     #[arg(long)]
     pub(crate) strict: bool,

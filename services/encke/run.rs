@@ -17,10 +17,14 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
     let assets = Assets::beside(args.chain.as_deref());
     let mut plan = plan(args, &assets)?;
-    // What a stage would refuse is refused here, before anything starts.
-    plan.sensor = dispatch::check(&plan, &assets)?;
     let name = args.instance.clone().unwrap_or_else(|| format!("run-{}", std::process::id()));
     let instance = Instance::named(&name).map_err(Failure::start)?;
+    let adoptable = if args.adopt { supervisor::find_adoptable(&instance, &plan) } else { None };
+    plan.sensor = match adoptable {
+        Some(running) => running.sensor,
+        // What a stage would refuse is refused here, before anything starts.
+        None => dispatch::check(&plan, &assets)?,
+    };
     let iceoryx2_config = assets.text("iceoryx2.toml").map_err(Failure::start)?;
     let files = [
         ("--detections", plan.outputs.detections.as_deref()),
@@ -31,7 +35,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     ];
     outputs::check(&files, &plan.source.from)?;
 
-    let settings = Settings { instance, plan, iceoryx2_config: &iceoryx2_config, spawn: !args.no_spawn };
+    let settings =
+        Settings { instance, plan, iceoryx2_config: &iceoryx2_config, spawn: !args.no_spawn, adopt: args.adopt };
     let report = supervisor::run(settings).map_err(Failure::start)?;
 
     let json = crate::report::to_json(&report)? + "\n";

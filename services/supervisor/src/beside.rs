@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use runtime::page::Page;
 use runtime::{Pace, Plan, TAPE, clock};
+use rustix::process::Pid;
 use serde::{Deserialize, Serialize};
 use tape::Counts;
 use transport::Instance;
@@ -52,6 +53,17 @@ pub(crate) struct Tape {
 impl Tape {
     pub(crate) fn new(instance: &Instance, plan: &Plan, spawn: bool) -> Result<Option<Self>, SupervisorError> {
         let tape = |name| Ok(Self { process: Watched::named(instance, plan, name, spawn)?, stopped: None });
+        plan.tape().map(tape).transpose()
+    }
+
+    /// The tape of a chain whose supervisor died.
+    pub(crate) fn adopt(
+        instance: &Instance,
+        plan: &Plan,
+        spawn: bool,
+        living: &[(String, Pid)],
+    ) -> Result<Option<Self>, SupervisorError> {
+        let tape = |name| Ok(Self { process: Watched::adopt(instance, plan, name, spawn, living)?, stopped: None });
         plan.tape().map(tape).transpose()
     }
 

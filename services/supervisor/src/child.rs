@@ -1,15 +1,17 @@
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 
 use runtime::page::{PageMap, State};
 use runtime::{Plan, SOURCE};
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open, pidfd_send_signal};
 use transport::Instance;
 
 use crate::SupervisorError;
 use crate::budget::Restarts;
-use crate::house::stage_process;
 use crate::processes::Usage;
+use crate::remains::{stage_of, stage_process};
 
 /// How a stage's process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,8 +37,18 @@ pub(crate) struct Watched {
     /// It was told to leave.
     pub(crate) told: bool,
     instance: Instance,
-    child: Option<Child>,
+    process: Option<Process>,
     ours: bool,
+}
+
+/// A process that the supervisor looks after.
+enum Process {
+    /// It started it.
+    Child(Child),
+    /// The supervisor before it did.
+    Adopted { pid: Pid, handle: OwnedFd },
+    /// It died while nobody looked after it; that is still to be told.
+    Departed,
 }
 
 impl Watched {
@@ -47,10 +59,42 @@ impl Watched {
 
     /// The same by name, for a process that is no stage of the chain.
     pub(crate) fn named(instance: &Instance, plan: &Plan, name: &str, ours: bool) -> Result<Self, SupervisorError> {
+        let page = PageMap::create(&Plan::page_path(instance, name))?;
+        Ok(Self::with_page(instance, plan, name, ours, page))
+    }
+
+    /// A stage, or a process beside the chain, of a supervisor that died: with its page as it is, and its process, if one
+    /// of `living` is it.
+    pub(crate) fn adopt(
+        instance: &Instance,
+        plan: &Plan,
+        name: &str,
+        ours: bool,
+        living: &[(String, Pid)],
+    ) -> Result<Self, SupervisorError> {
+        let page = PageMap::open(&Plan::page_path(instance, name))?;
+        let mut adopted = Self::with_page(instance, plan, name, ours, page);
+        // What was published before it was connected may not have been named yet; once more does no harm.
+        adopted.recovering = true;
+        if ours {
+            let pids = living.iter().filter(|(stage, _)| stage == name).map(|(_, pid)| *pid);
+            let handles = pids.filter_map(|pid| Some((pid, pidfd_open(pid, PidfdFlags::empty()).ok()?)));
+            // The number may have been used again before there was a handle.
+            let mut handles = handles.filter(|(pid, _)| stage_of(*pid, instance).is_some());
+            let has_lived = adopted.page.incarnation.get() > adopted.page.settled_incarnation.get();
+            adopted.process = match handles.next() {
+                Some((pid, handle)) => Some(Process::Adopted { pid, handle }),
+                None => has_lived.then_some(Process::Departed),
+            };
+            adopted.pids.extend(adopted.pid().map(|pid| pid.as_raw_nonzero().get() as u32));
+        }
+        Ok(adopted)
+    }
+
+    fn with_page(instance: &Instance, plan: &Plan, name: &str, ours: bool, page: PageMap) -> Self {
         let name = name.to_owned();
-        let page = PageMap::create(&Plan::page_path(instance, &name))?;
         let restarts = Restarts::new(plan.chain.restart_budget);
-        Ok(Self {
+        Self {
             name,
             page,
             restarts,
@@ -59,25 +103,27 @@ impl Watched {
             recovering: false,
             told: false,
             instance: instance.clone(),
-            child: None,
+            process: None,
             ours,
-        })
+        }
     }
 
-    /// Starts a process for it, where that is the supervisor's task.
+    /// Starts a process for it, where that is the supervisor's task and there is none.
     pub(crate) fn start(&mut self) -> Result<(), SupervisorError> {
-        if !self.ours {
+        if !self.ours || self.process.is_some() {
             return Ok(());
         }
         // In a group of its own: Ctrl-C at the terminal is for the supervisor, which ends the chain in order.
         let child = Command::new("/proc/self/exe")
             .args(["stage", &self.name, "--instance", self.instance.name()])
             .stdin(Stdio::null())
+            // The service manager listens to the supervisor alone.
+            .env_remove("NOTIFY_SOCKET")
             .process_group(0)
             .spawn()
             .map_err(|cause| SupervisorError::Spawn { stage: self.name.clone(), cause })?;
         self.pids.push(child.id());
-        self.child = Some(child);
+        self.process = Some(Process::Child(child));
         Ok(())
     }
 
@@ -89,13 +135,15 @@ impl Watched {
 
     /// Whether a process of it lives.
     pub(crate) fn is_alive(&self) -> bool {
-        if self.ours { self.child.is_some() } else { self.pid().is_some() }
+        if self.ours { self.process.is_some() } else { self.pid().is_some() }
     }
 
     /// Its process, if it has one.
     pub(crate) fn pid(&self) -> Option<Pid> {
-        if let Some(child) = &self.child {
-            return Pid::from_raw(child.id() as i32);
+        match &self.process {
+            Some(Process::Child(child)) => return Pid::from_raw(child.id() as i32),
+            Some(Process::Adopted { pid, .. }) => return Some(*pid),
+            Some(Process::Departed) | None => {}
         }
         let lives = self.page.incarnation.get() > self.page.settled_incarnation.get();
         // By its command line: a process that nobody has waited for yet still answers signals.
@@ -104,15 +152,10 @@ impl Watched {
 
     /// Whether its process has ended since the last look, and how.
     pub(crate) fn look(&mut self) -> Option<Ended> {
-        use std::os::unix::process::ExitStatusExt;
         if self.ours {
-            let status = self.child.as_mut()?.try_wait().ok().flatten()?;
-            self.child = None;
-            return Some(match (status.code(), status.signal()) {
-                (Some(code), _) => Ended::Code(code),
-                (None, Some(signal)) => Ended::Signal(signal),
-                (None, None) => Ended::Gone,
-            });
+            let ended = self.process.as_mut()?.ended()?;
+            self.process = None;
+            return Some(ended);
         }
         let pid = self.page.pid.get() as u32;
         let lives = self.page.incarnation.get() > self.page.settled_incarnation.get();
@@ -134,8 +177,35 @@ impl Watched {
     }
 
     fn signal(&self, signal: Signal) {
-        if let Some(pid) = self.pid() {
-            let _ = kill_process(pid, signal); // it may have gone a moment ago
+        // It may have gone a moment ago.
+        if let Some(Process::Adopted { handle, .. }) = &self.process {
+            let _ = pidfd_send_signal(handle, signal);
+        } else if let Some(pid) = self.pid() {
+            let _ = kill_process(pid, signal);
+        }
+    }
+}
+
+impl Process {
+    /// How it ended, if it did.
+    fn ended(&mut self) -> Option<Ended> {
+        use std::os::unix::process::ExitStatusExt;
+        match self {
+            Self::Child(child) => {
+                let status = child.try_wait().ok().flatten()?;
+                Some(match (status.code(), status.signal()) {
+                    (Some(code), _) => Ended::Code(code),
+                    (None, Some(signal)) => Ended::Signal(signal),
+                    (None, None) => Ended::Gone,
+                })
+            }
+            Self::Adopted { handle, .. } => {
+                // Also when whoever is its parent now never waits for it.
+                let mut handles = [PollFd::new(handle, PollFlags::IN)];
+                let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
+                poll(&mut handles, Some(&at_once)).is_ok_and(|ready| ready > 0).then_some(Ended::Gone)
+            }
+            Self::Departed => Some(Ended::Gone),
         }
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! Reading order: [`run`] → `watch` (the loop) → `settle` (after a death) → `ledger` (the account) → `report`.
 
+mod adopting;
 mod beside;
 mod budget;
 mod child;
@@ -13,10 +14,12 @@ mod executive;
 mod house;
 mod ledger;
 mod machine;
+mod manager;
 mod noise;
 mod overload;
 mod processes;
 mod progress;
+mod remains;
 mod report;
 mod scheduling;
 mod services;
@@ -30,12 +33,13 @@ mod watch;
 
 pub use beside::RecordingReport;
 pub use error::SupervisorError;
-pub use house::{Running, running_instances, stage_process};
+pub use house::{Running, find_adoptable, running_instances};
 pub use ledger::{GapReport, HopReport, LedgerReport};
 pub use machine::{CpuTimes, MachineLoad};
 pub use noise::measure_noise;
 pub use overload::{Move, OverloadReport};
 pub use processes::ProcessReport;
+pub use remains::stage_process;
 pub use report::{DeadlineReport, LEAST_MARGIN_PCT, LatencyReport, Report, StageLatency, TraceReport, VerdictReport};
 pub use status::{StageStatus, Status, status};
 pub use summary::summary;

@@ -108,6 +108,12 @@ impl Ladder {
         }
     }
 
+    /// Goes on at `step`, where one supervisor follows another; `sweeps` have been sent by now, and `trouble` is counted.
+    pub(crate) fn resume(&mut self, step: Step, sweeps: u64, trouble: Trouble) {
+        self.taken = self.config.steps.iter().position(|&number| number == step as u32).map_or(0, |place| place + 1);
+        (self.sweep, self.seen, self.at_move) = (sweeps, trouble, trouble);
+    }
+
     /// The step in force.
     pub(crate) fn step(&self) -> Step {
         match self.taken {

@@ -1,6 +1,7 @@
+use chain::SUPERVISOR;
 use messages::{Clusters, Descriptors, Detections, Sweep, Truth};
 use runtime::Plan;
-use transport::{Node, ServiceHold};
+use transport::{Node, Reopened, ServiceHold};
 
 use crate::SupervisorError;
 
@@ -15,18 +16,34 @@ impl Services {
     /// Creates every service before any stage starts: a process killed while it creates one can break it for good.
     pub(crate) fn create(node: &Node, plan: &Plan) -> Result<Self, SupervisorError> {
         let mut written = vec![node.create::<Sweep>()?];
-        for stage in &plan.chain.stages {
-            let Some(message) = &stage.writes else { continue };
-            written.push(match message.as_str() {
+        for (stage, message) in messages_of(plan) {
+            written.push(match message {
                 "Clusters" => node.create::<Clusters>()?,
                 "Descriptors" => node.create::<Descriptors>()?,
                 "Detections" => node.create::<Detections>()?,
-                _ => {
-                    return Err(SupervisorError::Message { stage: stage.name.clone(), message: message.clone() });
-                }
+                _ => return Err(unknown(stage, message)),
             });
         }
         Ok(Self { written, _truth: node.create::<Truth>()? })
+    }
+
+    /// Opens every service that a supervisor created which is dead now, and cleans up after it.
+    pub(crate) fn reopen(node: &Node, plan: &Plan) -> Result<Self, SupervisorError> {
+        let mut written = vec![node.reopen::<Sweep>()?];
+        for (stage, message) in messages_of(plan) {
+            written.push(match message {
+                "Clusters" => node.reopen::<Clusters>()?,
+                "Descriptors" => node.reopen::<Descriptors>()?,
+                "Detections" => node.reopen::<Detections>()?,
+                _ => return Err(unknown(stage, message)),
+            });
+        }
+        let truth = node.reopen::<Truth>()?;
+        // All are held open by now, so none can go with the dead. Dead stages stay: their readers have not drained them.
+        let (cleaned, uncleaned) = node.clean_dead_of(SUPERVISOR);
+        tracing::debug!(cleaned, uncleaned, "cleaned up after dead supervisors");
+        let written = written.into_iter().map(Reopened::hold).collect::<Result<_, _>>()?;
+        Ok(Self { written, _truth: truth.hold()? })
     }
 
     /// Wakes the readers of what the stage at `position` writes.
@@ -35,4 +52,13 @@ impl Services {
             service.wake();
         }
     }
+}
+
+/// What each stage writes, by the stage's name.
+fn messages_of(plan: &Plan) -> impl Iterator<Item = (&str, &str)> {
+    plan.chain.stages.iter().filter_map(|stage| Some((stage.name.as_str(), stage.writes.as_deref()?)))
+}
+
+fn unknown(stage: &str, message: &str) -> SupervisorError {
+    SupervisorError::Message { stage: stage.to_owned(), message: message.to_owned() }
 }

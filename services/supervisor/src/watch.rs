@@ -11,10 +11,12 @@ use signal_hook::iterator::Signals;
 use transport::{Instance, Node};
 
 use crate::SupervisorError;
+use crate::adopting::Household;
 use crate::beside::Tape;
 use crate::child::{Ended, Watched};
 use crate::house::House;
 use crate::machine::Machine;
+use crate::manager::Manager;
 use crate::noise::Noise;
 use crate::overload::{Ladder, OverloadReport, Trouble};
 use crate::processes::Usage;
@@ -45,13 +47,25 @@ pub struct Settings<'a> {
     pub iceoryx2_config: &'a str,
     /// Start the stages; else they are started by somebody else.
     pub spawn: bool,
+    /// Where the instance's supervisor died and its stages go on by the same plan: take them over.
+    pub adopt: bool,
 }
 
 /// Runs a chain from its first process to its last, and reports.
 pub fn run(settings: Settings<'_>) -> Result<Report, SupervisorError> {
     let signals = signals()?;
-    let house = House::take(settings.instance, settings.iceoryx2_config)?;
-    let outcome = Watch::begin(&house, &settings.plan, settings.spawn, signals).and_then(Watch::watch_through);
+    let mut house = House::take(&settings)?;
+    let plan = house.adopted().map(|adopted| adopted.plan.clone());
+    let adopted = plan.as_ref().map(|plan| Watch::begin(&house, plan, settings.spawn, signals.clone()));
+    let outcome = match adopted {
+        Some(Ok(watch)) => watch.watch_through(),
+        Some(Err(error)) => {
+            tracing::error!(%error, "the chain could not be adopted: it is ended, and started anew");
+            house = house.start_over(settings.iceoryx2_config)?;
+            Watch::begin(&house, &settings.plan, settings.spawn, signals).and_then(Watch::watch_through)
+        }
+        None => Watch::begin(&house, &settings.plan, settings.spawn, signals).and_then(Watch::watch_through),
+    };
     if let Err(error) = house.leave() {
         tracing::error!(%error, "the instance could not be removed");
     }
@@ -87,6 +101,7 @@ pub(crate) struct Watch<'a> {
     /// The supervisor's own page.
     pub(crate) page: PageMap,
     pub(crate) log: Log,
+    pub(crate) manager: Manager,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
     pub(crate) node: Node,
@@ -114,20 +129,19 @@ pub(crate) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Creates services and pages, then starts the stages: readers before writers, the source last.
+    /// Creates services and pages, then starts the stages: readers before writers, the source last. Where a chain is
+    /// adopted, all of it that is there is taken as it is.
     fn begin(house: &'a House, plan: &'a Plan, spawn: bool, signals: Receiver<i32>) -> Result<Self, SupervisorError> {
         let instance = house.instance();
         let node = Node::join(instance, "supervisor", plan.chain.queue_parts())?;
-        let services = Services::create(&node, plan)?;
-        let count = plan.stages().count();
-        let stages =
-            (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
-        let tape = Tape::new(instance, plan, spawn)?;
-        let page = PageMap::create(&Plan::page_path(instance, SUPERVISOR))?;
-        page.pid.set(u64::from(std::process::id()));
-        let log = Log::create(&Plan::events_path(instance))?;
+        let adopts = house.adopted();
+        let services = if adopts.is_some() { Services::reopen(&node, plan)? } else { Services::create(&node, plan)? };
+        let Household { stages, tape, page } = Household::of(house, plan, spawn)?;
+        let events = Plan::events_path(instance);
+        let log = if adopts.is_some() { Log::resume(&events)? } else { Log::create(&events)? };
         plan.write(instance)?;
         let now_ns = clock::now_ns();
+        let started_ns = page.run_began_ns.get();
         let mut watch = Self {
             instance,
             plan,
@@ -136,19 +150,20 @@ impl<'a> Watch<'a> {
             tape,
             page,
             log,
+            manager: Manager::of_environment(),
             services,
             node,
             signals,
             looks: tick(LOOK),
-            started_ns: now_ns,
+            started_ns,
             next_sample_ns: now_ns + SAMPLE_NS,
             usage: Usage::default(),
-            progress: Progress::new(now_ns, plan),
+            progress: Progress::new(started_ns, plan),
             ladder: Ladder::new(plan.chain.overload.clone()),
             overload: OverloadReport::default(),
             machine: Machine::default(),
             noise: Noise::start(plan.chain.realtime.seat(SUPERVISOR).priority),
-            timeline: Timeline::new(now_ns),
+            timeline: Timeline::new(started_ns),
             refused: Vec::new(),
             as_before: None,
             begun: false,
@@ -157,7 +172,10 @@ impl<'a> Watch<'a> {
             moved: 0,
             moved_ns: now_ns,
         };
-        watch.machine.look(now_ns, 0.0);
+        match adopts {
+            Some(adopted) => watch.take_over(adopted.before),
+            None => drop(watch.machine.look(now_ns, 0.0)),
+        }
         let started = watch.start_all();
         if started.is_err() {
             watch.kill_all();
@@ -178,8 +196,9 @@ impl<'a> Watch<'a> {
             self.stages[0].start()?;
             self.await_up(0)?;
         }
-        self.begun = true;
-        self.say(EventId::RunBegan, CHAIN, "all processes are up");
+        if !std::mem::replace(&mut self.begun, true) {
+            self.say(EventId::RunBegan, CHAIN, "all processes are up");
+        }
         self.take_seat();
         Ok(())
     }
@@ -306,6 +325,7 @@ impl<'a> Watch<'a> {
             self.sample();
         }
         self.progress.show(now_ns, &self.stages);
+        self.tell_manager();
         Ok(())
     }
 

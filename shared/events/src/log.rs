@@ -34,6 +34,23 @@ impl Log {
         Ok(Self { file, next: 0 })
     }
 
+    /// Goes on with the log at `path` where its writer died, with the number after the last event. A line that it did not
+    /// finish is cut off.
+    ///
+    /// # Errors
+    /// The file cannot be read or written.
+    pub fn resume(path: &Path) -> Result<Self, LogError> {
+        let failed = |cause| LogError { path: path.to_owned(), cause };
+        let mut log = Self::create(path)?;
+        let text = std::fs::read(path).map_err(failed)?;
+        let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        log.file.set_len(whole as u64).map_err(failed)?;
+        let mut lines = text[..whole].rsplit(|&byte| byte == b'\n');
+        let last = lines.find_map(|line| serde_json::from_slice::<Event>(line).ok());
+        log.next = last.map_or(0, |event| event.number + 1);
+        Ok(log)
+    }
+
     /// Says that something happened to `stage` while the source was at `sweep`.
     pub fn say(&mut self, (time_ns, utc_ns): (u64, u64), id: EventId, stage: &str, sweep: u64, text: &str) {
         let entry = id.entry();
@@ -54,5 +71,27 @@ impl Log {
         line.push(b'\n');
         // A full disk costs the log, not the chain.
         let _ = self.file.write_all(&line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CHAIN;
+
+    #[test]
+    fn a_successor_goes_on_with_the_next_number_and_drops_a_torn_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("events.jsonl");
+        let mut log = Log::create(&path).unwrap();
+        for sweep in 0..3 {
+            log.say((0, 0), EventId::RunBegan, CHAIN, sweep, "");
+        }
+        log.file.write_all(b"{\"number\":3,\"time").unwrap();
+        let mut sut = Log::resume(&path).unwrap();
+        sut.say((0, 0), EventId::SupervisorAdopted, CHAIN, 9, "");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let numbers: Vec<u64> = text.lines().map(|line| serde_json::from_str::<Event>(line).unwrap().number).collect();
+        assert_eq!(numbers, [0, 1, 2, 3]);
     }
 }
