@@ -52,6 +52,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         let mut loan = outlet.loan()?;
         let taken_before_ns = taken_by_others.lap_ns();
         let started_ns = clock::now_ns();
+        shell.fault_in_hand();
         let before_process = (shell.allocations)();
         let verdict = if deadline.is_stale(&trace, started_ns) {
             Verdict::RejectedStale
@@ -60,6 +61,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         };
         let in_process = (shell.allocations)() - before_process;
         shell.slow_down(trace.part);
+        shell.toil(started_ns);
         let finished_ns = clock::now_ns();
         let taken_busy_ns = taken_by_others.lap_ns();
 

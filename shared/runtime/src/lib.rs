@@ -8,7 +8,7 @@ pub mod clock;
 mod cycle;
 mod deadline;
 mod error;
-mod guardian;
+pub mod faults;
 mod kept;
 pub mod logging;
 mod pacer;

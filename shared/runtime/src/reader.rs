@@ -40,7 +40,7 @@ pub(crate) fn serve<T: Message>(
 fn drain<T: Message>(shell: &Shell, inlet: &Inlet<T>, reader: &mut impl Reader<T>) -> Result<(), ShellError> {
     let page = &shell.page;
     loop {
-        page.beat(clock::now_ns());
+        shell.beat();
         // Read before the look into the queue, so that an answer covers all that was sent by then.
         let (request, lose_below) = (page.drain_request.get(), page.lose_below.get());
         let Some(taken) = inlet.take()? else {

@@ -66,7 +66,7 @@ impl Shell {
         page.set_state(State::Starting);
         page.incarnation.set(before + 1);
         page.beat(clock::now_ns());
-        Ok(Self {
+        let shell = Self {
             name: name.to_owned(),
             position,
             instance,
@@ -77,7 +77,9 @@ impl Shell {
             guardian,
             _place: place,
             allocations,
-        })
+        };
+        shell.fault_at_start();
+        Ok(shell)
     }
 
     /// The run's plan.

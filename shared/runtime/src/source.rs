@@ -47,7 +47,7 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
 /// Sleeps as long as `holds`, alive, or until asked to leave.
 fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
     while holds() && !shell.leaving() {
-        shell.page.beat(clock::now_ns());
+        shell.beat();
         clock::sleep_ns(look_ns);
     }
 }
@@ -148,10 +148,11 @@ impl<'a> Out<'a> {
         let mut began_ns = clock::now_ns();
         let shell = self.shell;
         let (made, next) = self.kept.make(source, || {
-            shell.page.beat(clock::now_ns());
+            shell.beat();
             !shell.leaving()
         })?;
         self.shell.slow_down(Part { sectors: 1, ..Part::default() });
+        self.shell.toil(began_ns);
         if next != Next::Sweep || is_over(self.shell, &made.whole.header) {
             return Ok(false);
         }
@@ -201,6 +202,7 @@ impl<'a> Out<'a> {
         shell.page.make_in_hand(self.ordinal);
         let mut loan = self.sweeps.loan()?;
         self.cutter.fill(&made.whole, sector, loan.message_mut());
+        shell.fault_in_hand();
         let started_ns = clock::now_ns();
         let due_ns = match shell.plan.pace {
             Pace::Fast => clock::now_ns(),
@@ -260,7 +262,7 @@ impl<'a> Out<'a> {
         page.count_sent(self.trace.part);
         page.put_down();
         self.free_ns = clock::now_ns();
-        page.beat(self.free_ns);
+        self.shell.beat();
         page.sent_ns.set(self.free_ns);
         page.step_sent.set(self.trace.part.step.into());
         Ok(())
@@ -277,7 +279,7 @@ impl<'a> Out<'a> {
     /// Sleeps until host time `until_ns`, alive, unless it is to be `cut_short`.
     fn wait_until(&self, until_ns: u64, cut_short: impl Fn() -> bool) {
         while clock::now_ns() < until_ns && !cut_short() {
-            self.shell.page.beat(clock::now_ns());
+            self.shell.beat();
             clock::sleep_until_ns(until_ns.min(clock::now_ns() + LOOK_NS));
         }
     }
