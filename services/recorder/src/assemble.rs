@@ -130,6 +130,7 @@ mod tests {
                 ..SweepHeader::default()
             },
             rejected: false,
+            settles: true,
             detections: keys.iter().enumerate().map(detection).collect(),
             members: keys.to_vec(),
             solids: keys.iter().filter(|&&key| has_solid(key)).map(solid).collect(),

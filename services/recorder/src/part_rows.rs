@@ -6,6 +6,8 @@ pub(crate) struct PartRows {
     pub(crate) header: SweepHeader,
     /// Whether a stage rejected the part: its output is empty and says nothing of its returns.
     pub(crate) rejected: bool,
+    /// Whether the part counts as settled when it is written; one that was refused counts as that.
+    pub(crate) settles: bool,
     pub(crate) detections: Vec<Detection>,
     /// Empty where no labels are written.
     pub(crate) members: Vec<u32>,
@@ -19,6 +21,7 @@ impl PartRows {
             part: Part::default(),
             header: SweepHeader::default(),
             rejected: false,
+            settles: true,
             detections: Vec::with_capacity(MAX_CLUSTERS),
             members: Vec::with_capacity(if members { MAX_CLUSTERS } else { 0 }),
             solids: Vec::with_capacity(MAX_FITS),
@@ -29,6 +32,7 @@ impl PartRows {
         self.part = trace.part;
         self.header = input.header;
         self.rejected = is_rejected(trace);
+        self.settles = true;
         self.detections.clear();
         self.detections.extend_from_slice(&input.detections);
         self.members.clear();
@@ -37,6 +41,15 @@ impl PartRows {
         }
         self.solids.clear();
         self.solids.extend_from_slice(&input.solids);
+    }
+
+    /// A part of which nothing is used but that it came.
+    pub(crate) fn fill_refused(&mut self, trace: &Trace, header: &SweepHeader) {
+        (self.part, self.header) = (trace.part, *header);
+        (self.rejected, self.settles) = (true, false);
+        self.detections.clear();
+        self.members.clear();
+        self.solids.clear();
     }
 }
 

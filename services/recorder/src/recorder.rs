@@ -151,6 +151,21 @@ impl Sink for Recorder {
         verdict
     }
 
+    /// Counts the part, and writes its sweep without it. Never waits.
+    fn refuse(&mut self, trace: &Trace, input: &Detections, verdict: Verdict) -> Verdict {
+        let answer = self.statistics.add(trace, input, verdict);
+        if let Some(line) = &self.trace {
+            line.send(Traced { trace: *trace, answer });
+        }
+        let line = self.line.as_ref().filter(|_| !self.finished);
+        if let Some((line, mut rows)) = line.and_then(|line| Some((line, line.free.try_recv().ok()?))) {
+            rows.fill_refused(trace, &input.header);
+            // Only a dead writer refuses; then no sweep is written.
+            let _ = line.queue.try_send(rows);
+        }
+        verdict
+    }
+
     fn wanted_attempt(&self) -> u32 {
         self.order.map_or(0, |order| order.wanted_attempt())
     }

@@ -32,8 +32,8 @@ pub(crate) struct Statistics {
     timeline: Timeline,
     judge: Judge,
     misses: u64,
-    /// Sweeps without an answer because the recorder found a part of them malformed.
-    malformed_sweeps: u64,
+    /// Sweeps without an answer because a part of them was not used here, by verdict.
+    rejected_sweeps: Verdicts,
     parts: u64,
     /// Duration of the last sweep's turn; 0 before the first.
     period_ns: u64,
@@ -72,7 +72,7 @@ impl Statistics {
             timeline: Timeline::new(),
             judge: Judge::new(),
             misses: 0,
-            malformed_sweeps: 0,
+            rejected_sweeps: Verdicts::default(),
             parts: 0,
             period_ns: 0,
             sweeps: Sweeps::default(),
@@ -100,14 +100,14 @@ impl Statistics {
     fn add_part(&mut self, trace: &Trace, input: &Detections, verdict: Verdict, segments: &Segments) -> Option<Answer> {
         self.parts += 1;
         self.verdicts[verdict as usize] += 1;
-        let malformed = verdict == Verdict::RejectedMalformed;
+        let unused = matches!(verdict, Verdict::RejectedMalformed | Verdict::RejectedStale);
         let hops = trace.hops().iter().enumerate();
         let rejection = hops
             .map(|(stage, hop)| Rejection { stage, verdict: hop.verdict })
             .find(|rejection| rejection.verdict.is_rejected())
-            .or(malformed.then_some(Rejection { stage: self.stages.len(), verdict }));
+            .or(unused.then_some(Rejection { stage: self.stages.len(), verdict }));
         let (begins, ending) = self.sweeps.add(&trace.part, input.header.is_complete(), rejection);
-        if !malformed {
+        if !unused {
             self.add_rows(trace, input);
         }
         if segments.hop_count == 0 {
@@ -161,7 +161,7 @@ impl Statistics {
             // Nothing is missing: the sectors before were with the life before.
             (Some(stage), Verdict::RejectedIncomplete) => stage.misses[Kind::Restart as usize] += 1,
             (Some(stage), verdict) => stage.rejected_sweeps[verdict as usize] += 1,
-            (None, _) => self.malformed_sweeps += 1,
+            (None, verdict) => self.rejected_sweeps[verdict as usize] += 1,
         }
     }
 
@@ -247,6 +247,9 @@ impl Statistics {
                 count(causes, &format!("{} {what}", stage.name), misses);
             }
         }
-        count(causes, "recorder malformed", self.malformed_sweeps);
+        let here = Verdict::ALL.iter().map(|verdict| (verdict.name(), self.rejected_sweeps[*verdict as usize]));
+        for (what, misses) in here.filter(|&(_, misses)| misses > 0) {
+            count(causes, &format!("recorder {what}"), misses);
+        }
     }
 }

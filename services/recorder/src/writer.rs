@@ -47,10 +47,12 @@ impl Writer {
             if let Some(sweep) = assembly.add(&rows) {
                 self.write(sweep, &mut format);
             }
-            let part = rows.part;
+            let (part, settles) = (rows.part, rows.settles);
             // The buffer first: who sees the part settled finds room for another. Fails only when nobody is left.
             let _ = free.send(rows);
-            (self.progress.settled)(part);
+            if settles {
+                (self.progress.settled)(part);
+            }
         }
         if let Some(sweep) = assembly.end() {
             self.write(sweep, &mut format);

@@ -1,9 +1,10 @@
 use std::sync::Arc;
 
-use messages::Trace;
+use messages::{Trace, Verdict};
 use stage::{Settled, Sink};
 use transport::Taken;
 
+use crate::deadline::Deadline;
 use crate::reader::{Arrivals, Reader, serve};
 use crate::{Shell, ShellError, clock};
 
@@ -23,7 +24,8 @@ pub fn run_sink<K: Sink>(
     let inlet = node.inlet::<K::Input>()?;
     shell.running();
     let checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
-    let mut end = End { sink, shell: &shell, arrivals: Arrivals::new(&shell), checkpoint_ns };
+    let deadline = Deadline::of(&shell.plan, &shell.name);
+    let mut end = End { sink, shell: &shell, arrivals: Arrivals::new(&shell), deadline, checkpoint_ns };
     serve(&shell, &inlet, &mut end)?;
     let finished = end.sink.finish();
     shell.left();
@@ -34,6 +36,7 @@ struct End<'a, K: Sink> {
     sink: K,
     shell: &'a Shell,
     arrivals: Arrivals<'a>,
+    deadline: Deadline,
     checkpoint_ns: u64,
 }
 
@@ -54,8 +57,16 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
     /// One part: receive → in hand → accept → counted → out of hand → release. Settled comes later, from the sink.
     fn take(&mut self, taken: &Taken<K::Input>) -> Result<(), ShellError> {
         if self.arrivals.receive(taken.trace()) {
-            let verdict = self.sink.accept(taken.trace(), taken.message());
+            self.shell.fault_in_hand();
+            let started_ns = clock::now_ns();
+            // A stage may have stood still between its own look at the age and its answer.
+            let verdict = if self.deadline.is_stale(taken.trace(), started_ns) {
+                self.sink.refuse(taken.trace(), taken.message(), Verdict::RejectedStale)
+            } else {
+                self.sink.accept(taken.trace(), taken.message())
+            };
             self.shell.slow_down(taken.trace().part);
+            self.shell.toil(started_ns);
             self.shell.page.count_accepted(verdict);
             self.shell.page.wanted_attempt.set(self.sink.wanted_attempt().into());
             self.shell.page.put_down();

@@ -116,6 +116,10 @@ pub trait Sink {
     /// Anything but a rejection means that [`Settled`] will be told of the part.
     fn accept(&mut self, trace: &Trace, input: &Self::Input) -> Verdict;
 
+    /// Notes a part that the shell refuses with `verdict`, because nobody may act on it any more: nothing that it says is
+    /// used, and its sweep is not whole. Gives the verdict back; [`Settled`] is not told.
+    fn refuse(&mut self, trace: &Trace, input: &Self::Input, verdict: Verdict) -> Verdict;
+
     /// The attempt ([`Part::attempt`]) that is needed because parts are missing, where parts are sent again; else 0.
     fn wanted_attempt(&self) -> u32 {
         0
