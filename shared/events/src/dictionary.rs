@@ -123,10 +123,10 @@ dictionary! {
 
     // 7xx: what the source sends
     SourceEnded = 701, Info, "source_ended", "after sweep {a}", "The recording, or what was asked for, has come to its end.";
-    ClockStep = 702, Warning, "clock_step", "by {a} ms", "Sensor time went back or leapt ahead; the sweeps go on.";
+    ClockStep = 702, Warning, "clock_step", "by {a} ms (0: ahead, 1: back): {b}", "Sensor time went back, stood still or leapt ahead by more than 10 s; the sweeps go on.";
 
     // 8xx: faults on purpose
-    FaultInjected = 801, Info, "fault_injected", "fault {a} for {b}", "Somebody put a fault into the chain with `encke inject`.";
+    FaultInjected = 801, Info, "fault_injected", "fault {a} of the catalogue, by {b}", "Somebody put a fault into the chain with `encke inject`.";
 
     // 9xx: the log itself
     EventsUnread = 901, Warning, "events_unread", "", "A stage said more than was read; the gravest are kept.";

@@ -1,10 +1,11 @@
+use events::EventId;
 use messages::{Cutter, Hop, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
 use stage::{Next, Source};
 use transport::{Loan, Outlet};
 
 use crate::kept::Kept;
-use crate::pacer::Pacer;
-use crate::page::State;
+use crate::pacer::{Pacer, is_step};
+use crate::page::{Said, State};
 use crate::run_delay::Laps;
 use crate::window::Window;
 use crate::{Pace, Shell, ShellError, clock};
@@ -67,6 +68,8 @@ struct Out<'a> {
     trace: Trace,
     free_ns: u64,
     taken_by_others: Laps,
+    /// Header of the sweep made last; none before the first of this life.
+    before: Option<SweepHeader>,
 }
 
 impl<'a> Out<'a> {
@@ -88,6 +91,7 @@ impl<'a> Out<'a> {
             trace: Trace::default(),
             free_ns: clock::now_ns(),
             taken_by_others: Laps::of_this_thread(),
+            before: None,
         })
     }
 
@@ -153,6 +157,9 @@ impl<'a> Out<'a> {
         })?;
         self.shell.slow_down(Part { sectors: 1, ..Part::default() });
         self.shell.toil(began_ns);
+        if next == Next::Sweep {
+            note_step(shell, &mut self.before, &made.whole.header);
+        }
         if next != Next::Sweep || is_over(self.shell, &made.whole.header) {
             return Ok(false);
         }
@@ -292,7 +299,28 @@ fn is_over(shell: &Shell, header: &SweepHeader) -> bool {
     if began.get() == 0 {
         began.set(header.sensor_time_ns + 1);
     }
-    let end_ns = header.sensor_time_ns + header.period_ns;
-    let passed_ns = (end_ns + 1).saturating_sub(began.get());
+    let end_ns = header.sensor_time_ns.wrapping_add(header.period_ns);
+    // Modulo 2^64: steps of the clock may have moved the beginning below 0. A sweep before it has not passed.
+    let passed_ns = end_ns.wrapping_add(1).wrapping_sub(began.get());
+    let passed_ns = if passed_ns > u64::MAX / 2 { 0 } else { passed_ns };
     shell.plan.duration_ns.is_some_and(|duration_ns| passed_ns > duration_ns)
+}
+
+/// Says that the sensor's clock was set, where it was, and moves the run's beginning with it: an hour's step is no hour of
+/// the run.
+fn note_step(shell: &Shell, before: &mut Option<SweepHeader>, header: &SweepHeader) {
+    let Some(last) = before.replace(*header) else { return };
+    let (then_ns, now_ns) = (last.sensor_time_ns, header.sensor_time_ns);
+    if !is_step(then_ns, now_ns) {
+        return;
+    }
+    let expected_ns = then_ns.wrapping_add(last.period_ns);
+    let began = &shell.page.began_sensor_ns;
+    if began.get() > 0 {
+        // 0 means that there is none.
+        began.set(began.get().wrapping_add(now_ns.wrapping_sub(expected_ns)).max(1));
+    }
+    let (a, b) = (now_ns.abs_diff(expected_ns) / 1_000_000, u64::from(now_ns < expected_ns));
+    let sweep = shell.page.next_ordinal_out.get() / u64::from(shell.plan.chain.sectors.max(1));
+    shell.page.say(Said { id: EventId::ClockStep, time_ns: clock::now_ns(), sweep, a, b });
 }
