@@ -47,6 +47,10 @@ pub(crate) fn stage_of(pid: Pid, instance: &Instance) -> Option<String> {
 /// Ends what still lives of an instance whose supervisor is dead: in flow order, each when it has drained its input; who
 /// does not leave is killed. Returns how many there were.
 pub(crate) fn take_down(instance: &Instance) -> usize {
+    // Where there is no plan yet, they are stages that somebody has just started for the run to come.
+    if !Plan::exists(instance) {
+        return 0;
+    }
     let mut living = living(instance);
     let order: Vec<String> = Plan::read(instance).map_or(Vec::new(), |plan| plan.stages().map(str::to_owned).collect());
     // What is no stage of the chain, the tape, reads to the end.
