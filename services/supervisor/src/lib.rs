@@ -21,6 +21,7 @@ mod processes;
 mod progress;
 mod remains;
 mod report;
+mod restarts;
 mod scheduling;
 mod services;
 mod settle;

@@ -18,6 +18,7 @@ pub(crate) struct Sample {
     cpu_s: f64,
     rss_kib: u64,
     rss_peak_kib: u64,
+    threads: u64,
     scheduling: Scheduling,
 }
 
@@ -26,22 +27,23 @@ impl Sample {
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
         let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-        let (cpu_ticks, rss_pages) = parse_stat(&stat)?;
+        let (cpu_ticks, threads, rss_pages) = parse_stat(&stat)?;
         Some(Self {
             cpu_s: cpu_ticks as f64 / clock_ticks_per_second() as f64,
             rss_kib: rss_pages * page_size() as u64 / 1024,
             rss_peak_kib: parse_peak_kib(&status).unwrap_or(0),
+            threads,
             scheduling: Scheduling::of(pid),
         })
     }
 }
 
-/// Ticks of user and system time, and resident pages, of a `/proc/PID/stat` (proc(5): fields 14, 15 and 24).
-fn parse_stat(stat: &str) -> Option<(u64, u64)> {
+/// Ticks of user and system time, threads, and resident pages, of a `/proc/PID/stat` (proc(5): fields 14, 15, 20 and 24).
+fn parse_stat(stat: &str) -> Option<(u64, u64, u64)> {
     // Field 2 is the name in parentheses and may hold anything.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let field = |number: usize| fields.get(number - 3)?.parse::<u64>().ok();
-    Some((field(14)? + field(15)?, field(24)?))
+    Some((field(14)? + field(15)?, field(20)?, field(24)?))
 }
 
 fn parse_peak_kib(status: &str) -> Option<u64> {
@@ -84,6 +86,11 @@ impl Usage {
     /// Memory resident at the last look.
     pub(crate) fn rss_kib(&self) -> u64 {
         self.last.rss_kib
+    }
+
+    /// Threads at the last look.
+    pub(crate) fn threads(&self) -> u64 {
+        self.last.threads
     }
 
     fn scheduling(&self) -> Scheduling {
@@ -170,7 +177,7 @@ mod tests {
     #[test]
     fn fields_are_counted_after_the_name_whatever_it_holds() {
         let stat = "42 (a b) c) S 1 42 42 0 -1 4194304 100 0 0 0 7 5 0 0 20 0 1 0 99 1000 321 184 0";
-        assert_eq!(parse_stat(stat), Some((12, 321)));
+        assert_eq!(parse_stat(stat), Some((12, 1, 321)));
         assert_eq!(parse_stat("42 (short) S 1"), None);
     }
 

@@ -14,6 +14,7 @@ use crate::SupervisorError;
 use crate::adopting::Household;
 use crate::beside::Tape;
 use crate::child::{Ended, Watched};
+use crate::executive::{Executive, Signs};
 use crate::house::House;
 use crate::machine::Machine;
 use crate::manager::Manager;
@@ -101,7 +102,11 @@ pub(crate) struct Watch<'a> {
     /// The supervisor's own page.
     pub(crate) page: PageMap,
     pub(crate) log: Log,
-    pub(crate) manager: Manager,
+    pub(crate) executive: Executive,
+    /// Of all processes at the last look, the tape's last.
+    pub(crate) signs: Vec<Signs>,
+    /// The sample that watched values were taken from last.
+    pub(crate) sampled_ns: u64,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
     pub(crate) node: Node,
@@ -141,8 +146,11 @@ impl<'a> Watch<'a> {
         let log = if adopts.is_some() { Log::resume(&events)? } else { Log::create(&events)? };
         plan.write(instance)?;
         let now_ns = clock::now_ns();
-        let started_ns = page.run_began_ns.get();
+        let names = plan.stages().chain(plan.tape()).map(str::to_owned).collect();
         let mut watch = Self {
+            executive: Executive::new(&plan.executive, names, plan.chain.sectors, now_ns),
+            signs: Vec::new(),
+            sampled_ns: now_ns + SAMPLE_NS,
             instance,
             plan,
             spawn,
@@ -324,6 +332,7 @@ impl<'a> Watch<'a> {
             self.next_sample_ns = now_ns + SAMPLE_NS;
             self.sample();
         }
+        self.watch_health().iter().for_each(|order| self.obey(order));
         self.progress.show(now_ns, &self.stages);
         self.tell_manager();
         Ok(())

@@ -104,6 +104,7 @@ dictionary! {
     LimitViolated = 405, Warning, "limit_violated", "", "A watched value left its bounds for as many looks as the table asks.";
     LimitRestored = 406, Info, "limit_restored", "", "A watched value is within its bounds again.";
     LimitStale = 407, Warning, "limit_stale", "", "A watched value does not come any more.";
+    LimitNoNumber = 408, Error, "limit_no_number", "", "A watched value is no number: what it is made from is wrong.";
 
     // 5xx: modes, commands, tables
     ModeEntered = 501, Info, "mode_entered", "", "The mode changed as it should, within two sweeps.";

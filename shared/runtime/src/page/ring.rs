@@ -66,6 +66,11 @@ impl Page {
         }
     }
 
+    /// Events said so far, through all lives.
+    pub fn said(&self) -> u64 {
+        self.rings.grave_count.get() + self.rings.ordinary_count.get()
+    }
+
     /// What was said since the last look, the grave first, each ring in its order.
     pub fn hear(&self, heard: &mut Heard, mut tell: impl FnMut(Said)) {
         let rings = &self.rings;
@@ -135,6 +140,7 @@ mod tests {
         assert_eq!(hear(&page, &mut heard), [0, 1, 2]);
         page.say(said(EventId::PartsDropped, 3));
         assert_eq!(hear(&page, &mut heard), [3]);
+        assert_eq!(page.said(), 4);
         assert_eq!((hear(&page, &mut heard), heard.missed), (vec![], 0));
     }
 
