@@ -18,6 +18,11 @@ impl Pacer {
         Self { rate, anchor: None, last_ns: 0 }
     }
 
+    /// The next sweep begins when it comes, whatever time has passed.
+    pub(crate) fn start_anew(&mut self) {
+        self.anchor = None;
+    }
+
     /// Host time at which a sweep's first firing is due [ns]. The first sweep begins now.
     pub(crate) fn start_ns(&mut self, sensor_time_ns: u64, now_ns: u64) -> u64 {
         let goes_on = !is_step(self.last_ns, sensor_time_ns);
@@ -71,6 +76,14 @@ mod tests {
         let hour_ns = 3_600_000_000_000;
         assert_eq!(pacer.start_ns(hour_ns, 300), 300);
         assert_eq!(pacer.start_ns(hour_ns + 100, 310), 400);
+    }
+
+    #[test]
+    fn after_a_pause_the_next_sweep_begins_now_and_the_others_follow_at_their_distance() {
+        let mut pacer = Pacer::at_rate(1.0);
+        pacer.start_ns(1_000, 50);
+        pacer.start_anew();
+        assert_eq!((pacer.start_ns(1_100, 9_000), pacer.start_ns(1_200, 9_010)), (9_000, 9_100));
     }
 
     #[test]

@@ -14,6 +14,8 @@ use crate::{Pace, Shell, ShellError, clock};
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
+/// Between two looks at the flags while it stands still [ns]: a twentieth of a turn at 10 Hz.
+const PAUSE_LOOK_NS: u64 = 5_000_000;
 /// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
 /// one that the sink has and has not yet written.
 const KEPT_BESIDE: usize = 2;
@@ -24,6 +26,7 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
     let node = shell.join()?;
     let (sweeps, truths) = (node.outlet()?, node.outlet()?);
     let mut out = Out::new(shell, &sweeps, &truths)?;
+    shell.page.paused.set(0);
     shell.running();
     // Nothing is sent before everybody listens.
     wait_while(shell, LOOK_NS, || shell.page.may_start.get() == 0);
@@ -31,14 +34,12 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
     out.begin(&mut source)?;
     while !(shell.leaving() && out.is_between_sweeps()) {
         out.go_back_if_asked();
-        if !out.has_sweep() && !out.make(&mut source)? {
-            shell.page.set_state(State::Ended);
-            wait_while(shell, LOOK_NS, || !out.is_asked_back());
-            if !shell.leaving() {
-                shell.page.set_state(State::Running);
-            }
-        } else if !out.send()? {
-            break;
+        out.pause_if_asked(&mut source);
+        let next = if out.has_sweep() { Next::Sweep } else { out.make(&mut source)? };
+        match next {
+            Next::Sweep if !out.send()? => break,
+            Next::Sweep | Next::Nothing => {}
+            Next::End => out.wait_at_the_end(),
         }
     }
     shell.left();
@@ -51,6 +52,11 @@ fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
         shell.beat();
         clock::sleep_ns(look_ns);
     }
+}
+
+/// Nothing is under way: the next sweep will be at the step that is asked for.
+fn between_sweeps(shell: &Shell) {
+    shell.page.step_sent.set(shell.page.step.get());
 }
 
 /// The way out of the source: a sweep is made as a whole and leaves in sectors, each when the sensor would have it.
@@ -143,25 +149,68 @@ impl<'a> Out<'a> {
         self.kept.has(self.ordinal / self.sectors())
     }
 
-    /// Makes the next sweep. False at the end of the data, or of what was asked for.
-    fn make<S: Source>(&mut self, source: &mut S) -> Result<bool, ShellError> {
+    /// Whether it is to stand still here.
+    fn is_to_pause(&self) -> bool {
+        self.is_between_sweeps() && self.shell.page.pause.get() > 0
+    }
+
+    /// Stands still between two sweeps as long as it is told to. Then time begins anew: nobody catches up.
+    fn pause_if_asked<S: Source>(&mut self, source: &mut S) {
+        if !self.is_to_pause() || self.shell.leaving() {
+            return;
+        }
+        let page = &self.shell.page;
+        page.paused.set(1);
+        while self.is_to_pause() && !self.shell.leaving() {
+            page.beat(clock::now_ns());
+            between_sweeps(self.shell);
+            source.discard();
+            clock::sleep_ns(PAUSE_LOOK_NS);
+        }
+        source.discard();
+        self.pacer.start_anew();
+        if self.has_sweep() {
+            // Made before, and not sent.
+            let now_ns = clock::now_ns();
+            let made = self.kept.get(self.ordinal / self.sectors());
+            made.start_ns = self.pacer.start_ns(made.whole.header.sensor_time_ns, now_ns);
+            made.began_ns = now_ns;
+        }
+        page.paused.set(0);
+    }
+
+    /// Waits at the end of the data, until it is told to leave or to send something again.
+    fn wait_at_the_end(&self) {
+        let page = &self.shell.page;
+        page.set_state(State::Ended);
+        wait_while(self.shell, LOOK_NS, || {
+            between_sweeps(self.shell);
+            page.paused.set(page.pause.get());
+            !self.is_asked_back()
+        });
+        if !self.shell.leaving() {
+            page.set_state(State::Running);
+        }
+    }
+
+    /// Makes the next sweep; [`Next::End`] also where no more was asked for, [`Next::Nothing`] when it is to stand still.
+    fn make<S: Source>(&mut self, source: &mut S) -> Result<Next, ShellError> {
         let plan = &self.shell.plan;
         if plan.sweeps.is_some_and(|sweeps| self.ordinal / self.sectors() >= sweeps) {
-            return Ok(false);
+            return Ok(Next::End);
         }
         let mut began_ns = clock::now_ns();
         let shell = self.shell;
         let (made, next) = self.kept.make(source, || {
-            shell.beat();
-            !shell.leaving()
+            shell.page.beat(clock::now_ns());
+            between_sweeps(shell);
+            !shell.leaving() && shell.page.pause.get() == 0
         })?;
         self.shell.slow_down(Part { sectors: 1, ..Part::default() });
-        self.shell.toil(began_ns);
-        if next == Next::Sweep {
-            note_step(shell, &mut self.before, &made.whole.header);
-        }
-        if next != Next::Sweep || is_over(self.shell, &made.whole.header) {
-            return Ok(false);
+        match next {
+            Next::Sweep if is_over(self.shell, &made.whole.header) => return Ok(Next::End),
+            Next::Sweep => {}
+            Next::End | Next::Nothing => return Ok(next),
         }
         self.cutter.measure(&mut made.whole);
         let header = made.whole.header;
@@ -176,11 +225,10 @@ impl<'a> Out<'a> {
         if plan.pace == Pace::Realtime {
             self.shell.page.period_ns.set(self.pacer.host_ns(header.period_ns));
         }
-        // One step for the whole sweep. At --pace fast the ladder stands still, so that results do not depend on how busy the
-        // machine is.
+        // For a life that begins within the sweep.
         made.step = self.shell.page.step.get() as u32;
         self.kept.keep();
-        Ok(true)
+        Ok(Next::Sweep)
     }
 
     /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep
@@ -189,15 +237,18 @@ impl<'a> Out<'a> {
         let shell = self.shell;
         if shell.plan.source.single_step && self.is_between_sweeps() {
             let sweep = self.ordinal / self.sectors();
-            wait_while(shell, LOOK_NS, || shell.page.steps.get() <= sweep && !self.is_asked_back());
-            if shell.leaving() || self.is_asked_back() {
+            wait_while(shell, LOOK_NS, || {
+                between_sweeps(shell);
+                shell.page.steps.get() <= sweep && !self.is_asked_back() && !self.is_to_pause()
+            });
+            if shell.leaving() || self.is_asked_back() || self.is_to_pause() {
                 return Ok(!shell.leaving());
             }
         }
         if let Some(window) = &self.window {
             let is_shut = || !window.has_room(shell.page.published.get(), self.ordinal);
-            wait_while(shell, WINDOW_LOOK_NS, || is_shut() && !self.is_asked_back());
-            if is_shut() || self.is_asked_back() {
+            wait_while(shell, WINDOW_LOOK_NS, || is_shut() && !self.is_asked_back() && !self.is_to_pause());
+            if is_shut() || self.is_asked_back() || self.is_to_pause() {
                 return Ok(!shell.leaving());
             }
         }
@@ -227,10 +278,22 @@ impl<'a> Out<'a> {
         self.trace = Trace { part, due_ns, sweep_start_ns: made.start_ns, ..Trace::default() };
         // What was taken while it was made is the sweep's own time; only its time to leave counts.
         self.taken_by_others.lap_ns();
-        self.wait_until(due_ns, || sector == 0 && shell.leaving());
+        self.wait_until(due_ns, || {
+            if sector == 0 {
+                between_sweeps(shell);
+            }
+            shell.shutdown.orphaned() || (sector == 0 && (shell.leaving() || self.is_to_pause()))
+        });
         if clock::now_ns() < due_ns {
             shell.page.put_down();
-            return Ok(false);
+            return Ok(!shell.leaving());
+        }
+        if sector == 0 {
+            // One step for the whole sweep, as late as can be. At --pace fast the ladder stands still, so that results do not
+            // depend on how busy the machine is.
+            let step = shell.page.step.get() as u32;
+            self.kept.get(self.ordinal / u64::from(sectors)).step = step;
+            self.trace.part.step = step;
         }
         self.ordinal += 1;
         if shell.page.swallow.take_one() {

@@ -46,6 +46,10 @@ pub trait Source {
         Ok(())
     }
 
+    /// Drops what has come in the meantime, and what is gathered of a sweep. Called again and again while the chain is
+    /// paused. What is read from a file waits by itself.
+    fn discard(&mut self) {}
+
     /// Whether its sweeps come when they come: each is due at once.
     fn is_live(&self) -> bool {
         false

@@ -169,6 +169,15 @@ impl Source for Live {
         Ok(())
     }
 
+    /// Drops the packets that wait and the sweep being gathered; the next one begins with what comes then.
+    fn discard(&mut self) {
+        if let Some(intake) = self.intake() {
+            intake.discard();
+        }
+        self.sweeps.flush(&mut self.gathered);
+        self.gathered.clear();
+    }
+
     fn is_live(&self) -> bool {
         true
     }
