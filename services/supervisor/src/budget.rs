@@ -1,6 +1,7 @@
 use std::collections::VecDeque;
 
 use chain::RestartBudget;
+use chain::executive::ChainBudgetFile;
 
 /// Restarts of one stage within a sliding window.
 pub(crate) struct Restarts {
@@ -13,6 +14,16 @@ pub(crate) struct Restarts {
 impl Restarts {
     pub(crate) fn new(budget: RestartBudget) -> Self {
         Self { budget, recent_ns: VecDeque::new(), total: 0 }
+    }
+
+    /// Of all stages together.
+    pub(crate) fn of_chain(budget: ChainBudgetFile) -> Self {
+        Self::new(RestartBudget { restarts: budget.restarts, window_s: budget.window_s })
+    }
+
+    /// Begins anew: what was allowed so far does not count any more.
+    pub(crate) fn forget(&mut self) {
+        self.recent_ns.clear();
     }
 
     /// Whether one more restart is allowed at host time `now_ns`; if so it is counted.

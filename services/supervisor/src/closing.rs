@@ -53,7 +53,7 @@ impl Watch<'_> {
         let names: Vec<&str> = processes.iter().map(|process| process.stage.as_str()).collect();
         let timeline = TimelineReport::of(&self.timeline, &snapshot.timeline, &stages, &names);
         Report::of(Facts {
-            plan: self.plan,
+            plan: &self.plan,
             timeline,
             snapshot,
             ledger: ledger::account(&pages, self.plan.chain.sectors),
@@ -65,7 +65,11 @@ impl Watch<'_> {
             noise_ms: self.noise.finish(),
             realtime_refused: std::mem::take(&mut self.refused),
             stopped: self.failed.clone(),
-            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, self.plan)),
+            mode: self.modes.mode(),
+            modes: self.modes.report,
+            safe_entered: self.safe_entered.clone(),
+            commands: self.commands_report(),
+            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, &self.plan)),
         })
     }
 

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use events::{CHAIN, EventId};
 use runtime::clock;
 use runtime::page::State;
 
@@ -35,7 +36,9 @@ impl Watch<'_> {
                 }
             }
         }
-        self.end_tape()
+        self.end_tape()?;
+        self.say(EventId::RunEnds, CHAIN, "drained; all processes have left");
+        Ok(())
     }
 
     /// Tells a stage to leave and waits for it; one that does not is killed.

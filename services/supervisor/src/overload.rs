@@ -157,6 +157,11 @@ impl Ladder {
         None
     }
 
+    /// One step down, whatever the pages count; none where it stands on the last one.
+    pub(crate) fn step_down(&mut self, reason: &str) -> Option<Move> {
+        (self.taken < self.config.steps.len()).then(|| self.go(self.taken + 1, reason.to_owned()))
+    }
+
     fn go(&mut self, to: usize, reason: String) -> Move {
         let from = self.step();
         self.stepped_back = to < self.taken;
@@ -219,6 +224,14 @@ mod tests {
         pass(&mut sut, [false; 20]);
         pass(&mut sut, [true; 3]);
         assert_eq!(pass(&mut sut, [false; 10]).last(), Some(&Step::Nominal), "patience is forgotten when all is well");
+    }
+
+    #[test]
+    fn a_step_that_is_asked_for_is_taken_back_like_any_other() {
+        let mut sut = sut();
+        assert_eq!(sut.step_down("a rule").unwrap().reason, "a rule");
+        assert!(sut.step_down("again").is_some() && sut.step_down("and again").is_none());
+        assert_eq!(pass(&mut sut, [false; 20]).last(), Some(&Step::Nominal));
     }
 
     #[test]

@@ -1,15 +1,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use chain::Mode;
 use lidar::ObstacleClass;
 use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, WorstSweep};
 use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::beside::RecordingReport;
+use crate::control::CommandsReport;
 use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
+use crate::modes::{By, ModesReport};
 use crate::overload::OverloadReport;
 use crate::processes::ProcessReport;
+use crate::steering::SafeReport;
 use crate::timeline_report::TimelineReport;
 
 /// Everything that is known of a run, as `--report` writes it.
@@ -73,6 +77,14 @@ pub struct Report {
     pub recording: Option<RecordingReport>,
     /// Why the run stopped before its end, where it did.
     pub stopped: Option<String>,
+    /// The mode at the end.
+    pub mode: Mode,
+    /// Changes of mode.
+    pub modes: ModesReport,
+    /// How the chain came into safe mode, where it did; a spent budget before a command.
+    pub safe_entered: Option<SafeReport>,
+    /// Commands that came.
+    pub commands: CommandsReport,
     /// How the command ends, and why.
     pub verdict: VerdictReport,
     /// The distributions that `latency_ms` and its neighbours give percentiles of.
@@ -161,6 +173,10 @@ pub(crate) struct Facts<'a> {
     pub(crate) stopped: Option<String>,
     pub(crate) recording: Option<RecordingReport>,
     pub(crate) timeline: TimelineReport,
+    pub(crate) mode: Mode,
+    pub(crate) modes: ModesReport,
+    pub(crate) safe_entered: Option<SafeReport>,
+    pub(crate) commands: CommandsReport,
 }
 
 impl Report {
@@ -218,6 +234,10 @@ impl Report {
             ledger,
             recording: facts.recording,
             stopped,
+            mode: facts.mode,
+            modes: facts.modes,
+            safe_entered: facts.safe_entered,
+            commands: facts.commands,
             verdict: VerdictReport::default(),
             timeline: facts.timeline,
         };
@@ -250,6 +270,9 @@ impl Report {
         }
         if let Some(reason) = &self.stopped {
             return Some(reason.clone());
+        }
+        if let Some(SafeReport { by: By::Executive, reason, .. }) = &self.safe_entered {
+            return Some(format!("safe mode was entered: {reason}"));
         }
         let LostSweeps { detections, labels } = self.lost_sweeps;
         if detections + labels > 0 {

@@ -1,5 +1,6 @@
+use chain::{Mode, SUPERVISOR};
 use messages::Step;
-use runtime::page::PageMap;
+use runtime::page::{PageMap, Tier};
 use runtime::{Plan, SOURCE, ShellError, clock};
 use serde::{Deserialize, Serialize};
 use transport::Instance;
@@ -9,8 +10,18 @@ use transport::Instance;
 pub struct Status {
     /// The instance.
     pub instance: String,
-    /// `nominal`: there is no other mode yet.
+    /// The mode that was asked for last, by its word.
     pub mode: String,
+    /// From the moment when it was asked for until it was in effect [ms]; null while it is not.
+    pub mode_took_ms: Option<f64>,
+    /// Changes of mode so far.
+    pub mode_changes: u64,
+    /// Changes that did not take effect within two sweeps.
+    pub modes_late: u64,
+    /// Commands carried out so far.
+    pub commands_accepted: u64,
+    /// Commands refused so far.
+    pub commands_refused: u64,
     /// Sweeps that the source has published.
     pub sweep: u64,
     /// Sectors that a sweep travels as: so many parts are one sweep.
@@ -30,6 +41,8 @@ pub struct StageStatus {
     pub pid: u64,
     /// Where it is in its life.
     pub state: String,
+    /// Which build of the stage it is: `configured`, `built-in` or `stand-in`.
+    pub tier: String,
     /// Restarts so far.
     pub restarts: u64,
     /// Since its working thread last showed that it is alive [ms].
@@ -54,6 +67,7 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
             stage: stage.to_owned(),
             pid: page.pid.get(),
             state: page.state().name().to_owned(),
+            tier: Tier::from_number(page.tier.get()).name().to_owned(),
             restarts: page.incarnation.get().saturating_sub(1),
             heartbeat_age_ms: clock::now_ns().saturating_sub(page.heartbeat_ns.get()) as f64 / 1e6,
             received: page.received.get(),
@@ -66,5 +80,22 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
     let source = PageMap::open(&Plan::page_path(instance, SOURCE))?;
     let sweep = source.next_ordinal_out.get() / u64::from(sectors.max(1));
     let step = Step::from_number(source.step.get() as u32).name().to_owned();
-    Ok(Status { instance: instance.name().to_owned(), mode: "nominal".to_owned(), sweep, sectors, step, stages })
+    let own = PageMap::open(&Plan::page_path(instance, SUPERVISOR))?;
+    let mode = Mode::from_number(own.mode.get());
+    // The chain begins in its first mode: nobody asked for it.
+    let took_ns = own.mode_took_ns.get();
+    let mode_took_ms = (own.mode_asked_ns.get() == 0 || took_ns > 0).then_some(took_ns as f64 / 1e6);
+    Ok(Status {
+        instance: instance.name().to_owned(),
+        mode: mode.name().to_owned(),
+        mode_took_ms,
+        mode_changes: own.mode_changes.get(),
+        modes_late: own.modes_late.get(),
+        commands_accepted: own.commands_accepted.get(),
+        commands_refused: own.commands_refused.get(),
+        sweep,
+        sectors,
+        step,
+        stages,
+    })
 }

@@ -5,9 +5,9 @@ use std::fmt::Write;
 use messages::Step;
 use recorder::{Percentiles, WorstHop, WorstSweep};
 
-use crate::Report;
 use crate::beside::RecordingReport;
 use crate::report::{LEAST_MARGIN_PCT, TraceReport};
+use crate::{By, Report, SafeReport};
 
 /// The summary of a run, a page of text.
 pub fn summary(report: &Report) -> String {
@@ -50,10 +50,35 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
             "recording   {messages} messages, {lost} lost, in {files} files, {mib:.1} MiB, {restarts} restarts: {file}"
         )?;
     }
+    write_modes(text, report)?;
     if let Some(reason) = &report.stopped {
         writeln!(text, "STOPPED: {reason}")?;
     }
     Ok(())
+}
+
+/// Modes and commands, where there were any.
+fn write_modes(text: &mut String, report: &Report) -> std::fmt::Result {
+    let (modes, commands) = (report.modes, report.commands);
+    if modes.changes + modes.late + commands.accepted + commands.refused > 0 {
+        writeln!(
+            text,
+            "mode        {} at the end; {} changes, {} late, {:.1} ms at most; {} commands, {} refused",
+            report.mode.name(),
+            modes.changes,
+            modes.late,
+            modes.took_max_ms,
+            commands.accepted,
+            commands.refused
+        )?;
+    }
+    match &report.safe_entered {
+        Some(SafeReport { by, reason, sweep }) => {
+            let by = if *by == By::Command { "commanded" } else { "entered" };
+            writeln!(text, "SAFE MODE {by} at sweep {sweep}: {reason}")
+        }
+        None => Ok(()),
+    }
 }
 
 fn write_ledger(text: &mut String, report: &Report) -> std::fmt::Result {

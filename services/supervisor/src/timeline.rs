@@ -43,6 +43,17 @@ impl Merge for Used {
     }
 }
 
+impl Ended {
+    /// How it ended, in two words.
+    pub(crate) fn in_words(self) -> String {
+        match self {
+            Self::Code(code) => format!("exit code {code}"),
+            Self::Signal(signal) => format!("signal {signal}"),
+            Self::Gone => "gone".to_owned(),
+        }
+    }
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Happened {
@@ -98,12 +109,7 @@ impl Timeline {
 
     /// Notes that a stage is started anew, and why.
     pub(crate) fn restarted(&mut self, at_ns: u64, stage: &str, ended: Ended) {
-        let why = match ended {
-            Ended::Code(code) => format!("exit code {code}"),
-            Ended::Signal(signal) => format!("signal {signal}"),
-            Ended::Gone => "gone".to_owned(),
-        };
-        self.happen(at_ns, "restart", format!("{stage} ({why})"));
+        self.happen(at_ns, "restart", format!("{stage} ({})", ended.in_words()));
     }
 
     /// Notes a move on the ladder of overload.

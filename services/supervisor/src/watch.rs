@@ -3,6 +3,7 @@ use std::time::Duration;
 use chain::SUPERVISOR;
 use crossbeam_channel::{Receiver, bounded, select, tick};
 use events::{CHAIN, EventId, Log};
+use messages::Step;
 use runtime::page::{PageMap, State};
 use runtime::realtime::{self, AsBefore};
 use runtime::{Pace, Plan, clock};
@@ -13,18 +14,21 @@ use transport::{Instance, Node};
 use crate::SupervisorError;
 use crate::adopting::Household;
 use crate::beside::Tape;
-use crate::child::{Ended, Watched};
-use crate::executive::{Executive, Signs};
+use crate::budget::Restarts;
+use crate::child::Watched;
+use crate::commands::Refusals;
+use crate::control::Server;
 use crate::house::House;
+use crate::lives::Lives;
 use crate::machine::Machine;
-use crate::manager::Manager;
+use crate::modes::Modes;
 use crate::noise::Noise;
-use crate::overload::{Ladder, OverloadReport, Trouble};
+use crate::overload::{Ladder, OverloadReport};
 use crate::processes::Usage;
 use crate::progress::Progress;
 use crate::report::Report;
 use crate::services::Services;
-use crate::settle::settle;
+use crate::steering::SafeReport;
 use crate::timeline::Timeline;
 
 /// Between two looks at the pages.
@@ -95,7 +99,8 @@ fn signals() -> Result<Receiver<i32>, SupervisorError> {
 /// A chain being watched.
 pub(crate) struct Watch<'a> {
     pub(crate) instance: &'a Instance,
-    pub(crate) plan: &'a Plan,
+    /// As it was last written.
+    pub(crate) plan: Plan,
     pub(crate) spawn: bool,
     pub(crate) stages: Vec<Watched>,
     pub(crate) tape: Option<Tape>,
@@ -123,7 +128,16 @@ pub(crate) struct Watch<'a> {
     pub(crate) as_before: Option<AsBefore>,
     pub(crate) progress: Progress,
     pub(crate) ladder: Ladder,
+    /// Where it stood when that was last told.
+    pub(crate) ladder_stood: Step,
     pub(crate) overload: OverloadReport,
+    pub(crate) modes: Modes,
+    pub(crate) safe_entered: Option<SafeReport>,
+    /// Of each stage, in flow order.
+    pub(crate) lives: Vec<Lives>,
+    pub(crate) chain_budget: Restarts,
+    pub(crate) control: Server,
+    pub(crate) refusals: Refusals,
     /// Every stage was up once.
     pub(crate) begun: bool,
     pub(crate) stop_asked: bool,
@@ -146,13 +160,13 @@ impl<'a> Watch<'a> {
         let log = if adopts.is_some() { Log::resume(&events)? } else { Log::create(&events)? };
         plan.write(instance)?;
         let now_ns = clock::now_ns();
-        let names = plan.stages().chain(plan.tape()).map(str::to_owned).collect();
+        let budget = plan.chain.restart_budget;
         let mut watch = Self {
             executive: Executive::new(&plan.executive, names, plan.chain.sectors, now_ns),
             signs: Vec::new(),
             sampled_ns: now_ns + SAMPLE_NS,
             instance,
-            plan,
+            plan: plan.clone(),
             spawn,
             stages,
             tape,
@@ -168,7 +182,14 @@ impl<'a> Watch<'a> {
             usage: Usage::default(),
             progress: Progress::new(started_ns, plan),
             ladder: Ladder::new(plan.chain.overload.clone()),
+            ladder_stood: Step::Nominal,
             overload: OverloadReport::default(),
+            modes: Modes::new(plan.chain.sectors, plan.pace == Pace::Realtime),
+            safe_entered: None,
+            lives: (0..count).map(|position| Lives::new(budget, position > 0)).collect(),
+            chain_budget: Restarts::of_chain(plan.executive.chain_budget),
+            control: Server::start(instance)?,
+            refusals: Refusals::default(),
             machine: Machine::default(),
             noise: Noise::start(plan.chain.realtime.seat(SUPERVISOR).priority),
             timeline: Timeline::new(started_ns),
@@ -287,6 +308,9 @@ impl<'a> Watch<'a> {
             (self.moved, self.moved_ns) = (moved, clock::now_ns());
         }
         let waits_for_step = self.plan.source.single_step && self.is_answered();
+        if self.modes.is_paused() || self.stages[0].page.paused.get() > 0 {
+            self.moved_ns = clock::now_ns();
+        }
         if !self.begun || waits_for_step || clock::now_ns() - self.moved_ns < STALL_NS {
             return false;
         }
@@ -303,7 +327,7 @@ impl<'a> Watch<'a> {
         stage.next_sequence.get() >= before.published.get() && stage.held(self.is_sink(position)) == 0
     }
 
-    fn is_sink(&self, position: usize) -> bool {
+    pub(crate) fn is_sink(&self, position: usize) -> bool {
         position + 1 == self.stages.len()
     }
 
@@ -315,89 +339,28 @@ impl<'a> Watch<'a> {
                     self.stop_asked = true;
                 }
             }
+            recv(self.control.asked) -> asked => {
+                match asked {
+                    Ok(asked) => self.carry_out(&asked)?,
+                    Err(_) => self.control.asked = crossbeam_channel::never(),
+                }
+            }
             recv(self.looks) -> _ => {}
         }
-        // All are looked at first, and the last recovers first: whoever asks a reader finds it settled.
         let ended: Vec<_> = self.stages.iter_mut().map(Watched::look).collect();
-        for (position, ended) in ended.into_iter().enumerate().rev() {
-            if let Some(ended) = ended {
-                self.recover(position, ended)?;
-            }
-            self.name_losses(position);
-        }
+        self.recover_all(&ended)?;
+        (0..self.stages.len()).rev().for_each(|position| self.name_losses(position));
         self.look_at_tape()?;
         self.climb();
+        self.look_at_mode();
         let now_ns = clock::now_ns();
         if now_ns >= self.next_sample_ns {
             self.next_sample_ns = now_ns + SAMPLE_NS;
             self.sample();
         }
-        self.watch_health().iter().for_each(|order| self.obey(order));
+        self.tell_of_refusals(now_ns);
         self.progress.show(now_ns, &self.stages);
         self.tell_manager();
         Ok(())
-    }
-
-    /// A stage's process has ended: settle its account and start its successor.
-    fn recover(&mut self, position: usize, ended: Ended) -> Result<(), SupervisorError> {
-        if let Some(tape) = self.tape.as_ref().filter(|_| position == 0 || self.is_sink(position + 1)) {
-            tape.drain();
-        }
-        settle(&self.node, &self.services, &mut self.stages, position, ended);
-        let stage = &mut self.stages[position];
-        if stage.told {
-            return Ok(());
-        }
-        if ended == Ended::Code(CANNOT_START) {
-            if !self.begun {
-                return Err(SupervisorError::Refused(stage.name.clone()));
-            }
-            self.failed.get_or_insert(format!("stage {:?} could not start again: the chain was stopped", stage.name));
-            stage.told = true;
-            return Ok(());
-        }
-        if !stage.restarts.allow(clock::now_ns()) {
-            let budget = self.plan.chain.restart_budget;
-            self.failed.get_or_insert(format!(
-                "stage {:?} died more than {} times within {} s: the chain was stopped",
-                stage.name, budget.restarts, budget.window_s
-            ));
-            stage.told = true;
-            return Ok(());
-        }
-        stage.recovering = true;
-        self.timeline.restarted(clock::now_ns(), &stage.name, ended);
-        // A child inherits the seat of the one who starts it.
-        let _for_the_child = self.as_before.as_ref().map(AsBefore::for_a_moment);
-        stage.start()
-    }
-
-    /// A successor is connected: what was published before that and did not reach it is lost. It says so itself, once
-    /// it has looked; nobody waits for what will never come.
-    fn name_losses(&mut self, position: usize) {
-        if !self.stages[position].recovering || !self.stages[position].is_up() {
-            return;
-        }
-        self.stages[position].recovering = false;
-        if position > 0 {
-            let published = self.stages[position - 1].page.published.get();
-            self.stages[position].page.lose_below.set(published);
-            self.services.wake_readers_of(position - 1);
-        }
-    }
-
-    /// Tells the source how much of its work the chain is to leave out.
-    fn climb(&mut self) {
-        if self.plan.pace == Pace::Fast {
-            return;
-        }
-        let source = &self.stages[0].page;
-        let sweeps = source.published.get() / u64::from(self.plan.chain.sectors.max(1));
-        let trouble = Trouble::of(self.stages.iter().map(|stage| &*stage.page));
-        let Some(step) = self.ladder.look(sweeps, trouble) else { return };
-        source.step.set(self.ladder.step() as u64);
-        tracing::warn!(sweep = step.sweep, from = step.from, to = step.to, reason = step.reason, "overload");
-        self.timeline.stepped(clock::now_ns(), &step);
-        self.overload.note(step);
     }
 }
