@@ -55,8 +55,8 @@ pub(crate) enum Command {
     /// Put one fault into a running chain, to see it accounted for.
     #[command(after_help = INJECT_EXAMPLES)]
     Inject(InjectArgs),
-    /// Look at a running chain, let it take a step, or stop it.
-    #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
+    /// Look at a running chain, command it, or stop it.
+    #[command(after_help = CTL_EXAMPLES)]
     Ctl(CtlArgs),
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]

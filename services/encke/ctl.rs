@@ -1,15 +1,20 @@
 use runtime::page::PageMap;
 use runtime::{Plan, SOURCE};
 use rustix::process::{Pid, Signal, kill_process};
-use supervisor::Status;
+use supervisor::{Command, Status, Tables, Word};
+use transport::Instance;
 
+use crate::assets::Assets;
 use crate::cli::{CtlArgs, Request};
-use crate::{Failure, instances};
+use crate::{Failure, dispatch, instances, run};
 
-/// Looks at a running chain, lets it take a step, or stops it.
+/// Looks at a running chain, or commands it.
 pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
+    if let Some(contradiction) = args.contradiction() {
+        return Err(Failure::start(contradiction));
+    }
     let (instance, running) = instances::find(args.instance.as_deref())?;
-    match args.request {
+    let command = match args.request {
         Request::Status => {
             let status = supervisor::status(&instance).map_err(Failure::start)?;
             let text = if args.json {
@@ -17,38 +22,69 @@ pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
             } else {
                 table(&status)
             };
-            crate::print(&text)
+            return crate::print(&text);
         }
         Request::Stop => {
             let supervisor = Pid::from_raw(running.pid as i32);
             let supervisor = supervisor.ok_or_else(|| Failure::start("the supervisor's process is not known"))?;
-            kill_process(supervisor, Signal::TERM).map_err(Failure::run)
+            return kill_process(supervisor, Signal::TERM).map_err(Failure::run);
         }
-        Request::Step => {
-            let plan = Plan::read(&instance).map_err(Failure::start)?;
-            if !plan.source.single_step {
-                return Err(Failure::start("the chain goes by itself: start it with --pace step to go by steps"));
-            }
-            let page = PageMap::open(&Plan::page_path(&instance, SOURCE)).map_err(Failure::start)?;
-            page.steps.give(1);
-            Ok(())
-        }
+        Request::Step => return step(&instance),
+        Request::Pause => Command::of(Word::Pause),
+        Request::Resume => Command::of(Word::Resume),
+        Request::Degrade => Command::of(Word::Degrade),
+        Request::Safe => Command::of(Word::Safe),
+        Request::Restart => Command { stage: args.stage.clone(), ..Command::of(Word::Restart) },
+        Request::RestartChain => Command::of(Word::RestartChain),
+        Request::Reload => Command { tables: Some(tables(&instance)?), ..Command::of(Word::Reload) },
+    };
+    let answer = supervisor::command(&instance, &command).map_err(Failure::start)?;
+    if args.json {
+        crate::print(&(serde_json::to_string(&answer).map_err(Failure::run)? + "\n"))?;
+    }
+    match (answer.accepted, args.json) {
+        (true, true) => Ok(()),
+        (true, false) => crate::print(&(answer.text + "\n")),
+        (false, _) => Err(Failure::run(format!("refused: {}", answer.text))),
     }
 }
 
+fn step(instance: &Instance) -> Result<(), Failure> {
+    let plan = Plan::read(instance).map_err(Failure::start)?;
+    if !plan.source.single_step {
+        return Err(Failure::start("the chain goes by itself: start it with --pace step to go by steps"));
+    }
+    let page = PageMap::open(&Plan::page_path(instance, SOURCE)).map_err(Failure::start)?;
+    page.steps.give(1);
+    Ok(())
+}
+
+/// The chain's files as they are now, all of them checked as at a start.
+fn tables(instance: &Instance) -> Result<Tables, Failure> {
+    let mut plan = Plan::read(instance).map_err(Failure::start)?;
+    let assets = Assets::in_dirs(plan.config_dirs.clone());
+    plan.parameters = run::parameters(&plan.chain, &assets)?;
+    run::executive(&plan.chain, &assets)?;
+    dispatch::check_stages(&plan, &assets)?;
+    Ok(Tables { parameters: plan.parameters, executive: assets.text("executive.toml").map_err(Failure::start)? })
+}
+
 fn table(status: &Status) -> String {
-    let mut text = format!("{} {}, sweep {}\n", status.instance, status.mode, status.sweep);
-    text += "stage            pid  state     restarts  heartbeat [ms]    received   published\n";
+    let waits = if status.mode_took_ms.is_none() { " (not yet in effect)" } else { "" };
+    let mut text =
+        format!("{} {}{waits}, step {}, sweep {}\n", status.instance, status.mode, status.step, status.sweep);
+    text += "stage            pid  state     restarts  heartbeat [ms]    received   published  build\n";
     for stage in &status.stages {
         text += &format!(
-            "{:<12}{:>8}  {:<10}{:>8}{:>16.1}{:>12}{:>12}\n",
+            "{:<12}{:>8}  {:<10}{:>8}{:>16.1}{:>12}{:>12}  {}\n",
             stage.stage,
             stage.pid,
             stage.state,
             stage.restarts,
             stage.heartbeat_age_ms,
             stage.received,
-            stage.published
+            stage.published,
+            stage.tier
         );
     }
     text

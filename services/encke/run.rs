@@ -55,12 +55,7 @@ fn verdict(report: &Report, strict: bool) -> Result<(), Failure> {
 /// Everything that the processes of the run must agree on.
 pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
     let chain = chain(args, assets)?;
-    let mut parameters = BTreeMap::new();
-    for stage in &chain.stages {
-        if let Some(path) = &stage.parameters {
-            parameters.insert(stage.name.clone(), assets.text(path).map_err(Failure::start)?);
-        }
-    }
+    let parameters = parameters(&chain, assets)?;
     let from = match &args.from {
         Some(from) => sources::locate(from, assets)?,
         None => sources::locate_default(&chain.default_source, assets)?,
@@ -109,6 +104,12 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
         config_dirs: assets.dirs().to_vec(),
         chain,
     })
+}
+
+/// Text of each stage's file of parameters.
+pub(crate) fn parameters(chain: &Chain, assets: &Assets) -> Result<BTreeMap<String, String>, Failure> {
+    let stages = chain.stages.iter().filter_map(|stage| Some((stage.name.clone(), stage.parameters.as_deref()?)));
+    stages.map(|(name, path)| Ok((name, assets.text(path).map_err(Failure::start)?))).collect()
 }
 
 /// An option that would change nothing is a mistake of the one who wrote it.

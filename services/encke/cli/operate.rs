@@ -35,10 +35,24 @@ pub(crate) struct InjectArgs {
 }
 
 /// What to ask of a running chain.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Request {
     /// Its mode, its stages and their counts.
     Status,
+    /// Stand still between two sweeps; all processes wait.
+    Pause,
+    /// Go on after a pause; else do all of the work again, with a fresh chance for stages that were replaced.
+    Resume,
+    /// Leave out one step of the ladder of overload more.
+    Degrade,
+    /// Do the least that is useful: locate obstacles, do not classify them.
+    Safe,
+    /// End a stage's process and start it again, as configured.
+    Restart,
+    /// The same with all stages.
+    RestartChain,
+    /// Read stage parameters and executive.toml again; they are checked first, and used from one sweep on.
+    Reload,
     /// Stop in order, drain, report.
     Stop,
     /// With --pace step: one more sweep.
@@ -51,10 +65,59 @@ pub(crate) struct CtlArgs {
     /// What to do.
     #[arg(value_enum)]
     pub(crate) request: Request,
+    /// restart: the stage.
+    pub(crate) stage: Option<String>,
     /// The chain. [default: the only one that runs]
     #[arg(long, value_name = "NAME")]
     pub(crate) instance: Option<String>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl CtlArgs {
+    /// An argument that would change nothing, if there is one, or one that is missing.
+    pub(crate) fn contradiction(&self) -> Option<String> {
+        let word = self.request.to_possible_value()?.get_name().to_owned();
+        match (&self.stage, self.request) {
+            (None, Request::Restart) => {
+                Some("restart needs a stage; `encke ctl restart-chain` restarts all of them".to_owned())
+            }
+            (Some(stage), request) if request != Request::Restart => {
+                Some(format!("{word} takes no stage: leave {stage:?} out"))
+            }
+            _ if self.json && matches!(self.request, Request::Stop | Request::Step) => {
+                Some(format!("{word} prints nothing: leave --json out"))
+            }
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Bare {
+        #[command(flatten)]
+        args: CtlArgs,
+    }
+
+    fn contradiction(args: &[&str]) -> Option<String> {
+        let args = ["ctl"].iter().chain(args);
+        Bare::parse_from(args).args.contradiction()
+    }
+
+    #[test]
+    fn arguments_that_change_nothing_are_refused() {
+        for args in [["restart", "clusterer"].as_slice(), &["pause"], &["restart-chain"], &["status", "--json"]] {
+            assert_eq!(contradiction(args), None);
+        }
+        for args in [["pause", "clusterer"].as_slice(), &["restart"], &["stop", "--json"], &["reload", "clusterer"]] {
+            assert!(contradiction(args).is_some(), "{args:?}");
+        }
+    }
 }
