@@ -1,6 +1,7 @@
 mod look;
 mod notes;
 mod operate;
+mod soak;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,6 +11,7 @@ pub(crate) use look::{LiveArgs, ReportArgs, TopArgs, ViewArgs};
 use notes::*;
 pub(crate) use operate::{CtlArgs, Fault, InjectArgs, Request};
 use runtime::Pace;
+pub(crate) use soak::SoakArgs;
 
 /// Onboard lidar perception for spacecraft in clutter: a chain of processes that turns lidar sweeps into classified
 /// obstacles at sensor rate, with every deadline watched and every sweep accounted for.
@@ -55,8 +57,11 @@ pub(crate) enum Command {
     /// Put one fault into a running chain, to see it accounted for.
     #[command(after_help = INJECT_EXAMPLES)]
     Inject(InjectArgs),
-    /// Look at a running chain, command it, or stop it.
-    #[command(after_help = CTL_EXAMPLES)]
+    /// Run the chain for long, with faults or without, and judge what that has shown.
+    #[command(after_help = SOAK_NOTES)]
+    Soak(Box<SoakArgs>),
+    /// Look at a running chain, let it take a step, or stop it.
+    #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
     Ctl(CtlArgs),
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]

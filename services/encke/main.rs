@@ -17,6 +17,7 @@ mod outputs;
 mod report;
 mod run;
 mod simulate;
+mod soak;
 mod sources;
 mod taping;
 mod top;
@@ -81,6 +82,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::BenchHopPeer(args) => bench::hop::peer(&args),
         Command::Inject(args) => inject::inject(&args),
+        Command::Soak(args) => soak::soak(&args),
         Command::Ctl(args) => ctl::ctl(&args),
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Report(args) => report::report(&args),

@@ -81,6 +81,19 @@ pub(super) const INJECT_EXAMPLES: &str = "Faults:
 Example:
   encke inject stop clusterer --for 500ms";
 
+pub(super) const SOAK_NOTES: &str = "\
+The chain runs as a process of its own and is looked at from outside. --faults names a campaign: a list of faults, or one of the
+kinds kills, kill-all, cycles, mode-changes, day, which have a length of their own. What must be reached: config/soak.toml; how
+each bar is measured: services/soak/README.md.
+DIR gets verdict.html, verdict.json, samples.csv, events.jsonl, the run's own report, and of faults matrix.md.
+Ctrl-C ends it early, with a verdict over what was.
+Exit codes: 0 all bars hold, 1 one was not reached, 2 cannot start.
+
+Examples:
+  encke soak --duration 2h --out soak/
+  encke soak --faults config/faults/kills.toml --seed 7 --out kills/
+  encke soak --faults config/faults/day.toml --out day/";
+
 pub(super) const REPORT_NOTES: &str = "\
 The page needs nothing else: no script, no font, no address. It shows the distribution of latency and
 how it went over time, what sweeps spent it on, misses by cause, the slowest sweeps, the ledger, CPU and
