@@ -77,11 +77,14 @@ impl Watched {
         // What was published before it was connected may not have been named yet; once more does no harm.
         adopted.recovering = true;
         if ours {
-            let pids = living.iter().filter(|(stage, _)| stage == name).map(|(_, pid)| *pid);
+            let has_lived = adopted.page.incarnation.get() > adopted.page.settled_incarnation.get();
+            let on_page = adopted.page.pid.get();
+            // One that has not taken its page yet stands nowhere but in the list of processes.
+            let is_it = |pid: &Pid| !has_lived || pid.as_raw_nonzero().get() as u64 == on_page;
+            let pids = living.iter().filter(|(stage, _)| stage == name).map(|(_, pid)| *pid).filter(is_it);
             let handles = pids.filter_map(|pid| Some((pid, pidfd_open(pid, PidfdFlags::empty()).ok()?)));
             // The number may have been used again before there was a handle.
             let mut handles = handles.filter(|(pid, _)| stage_of(*pid, instance).is_some());
-            let has_lived = adopted.page.incarnation.get() > adopted.page.settled_incarnation.get();
             adopted.process = match handles.next() {
                 Some((pid, handle)) => Some(Process::Adopted { pid, handle }),
                 None => has_lived.then_some(Process::Departed),
