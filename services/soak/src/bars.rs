@@ -52,6 +52,8 @@ pub struct NoFaultBars {
     pub restarts: u64,
     /// Most growth of a process's memory after five minutes [%].
     pub memory_growth_pct: f64,
+    /// Most growth of the shared memory that is taken, after five minutes [%].
+    pub shared_memory_growth_pct: f64,
     /// Most rise of the median latency [%].
     pub p50_drift_pct: f64,
     /// Most rise of p99 [%].
@@ -127,6 +129,7 @@ impl BarsFile {
             ("settle_s", settle_s),
             ("idle_pct", idle_pct),
             ("no_faults.memory_growth_pct", no_faults.memory_growth_pct),
+            ("no_faults.shared_memory_growth_pct", no_faults.shared_memory_growth_pct),
             ("no_faults.p50_drift_pct", no_faults.p50_drift_pct),
             ("no_faults.p99_drift_pct", no_faults.p99_drift_pct),
             ("kills.detected_ms", kills.detected_ms),

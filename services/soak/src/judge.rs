@@ -6,7 +6,7 @@ use crate::bars::Bars;
 use crate::look::{ProcessRecord, SETTLE_S, Steady};
 use crate::matrix::Row;
 use crate::statistics::Drift;
-use crate::verdict::{Available, Bar};
+use crate::verdict::{Available, Bar, SharedMemoryRecord};
 
 /// What there is to judge.
 pub(crate) struct Facts<'a> {
@@ -14,7 +14,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) available: &'a Available,
     pub(crate) drift: &'a Drift,
     pub(crate) processes: &'a [ProcessRecord],
-    pub(crate) shared: Option<Steady>,
+    pub(crate) shared: &'a SharedMemoryRecord,
     pub(crate) restarts: u64,
     pub(crate) rows: &'a [Row],
     pub(crate) reports: &'a [Report],
@@ -158,7 +158,17 @@ impl Facts<'_> {
         ]
     }
 
-    fn constants(&self) -> [Bar; 3] {
+    /// Objects in shared memory are made at their full length; what is touched of them for the first time takes memory.
+    fn touched(&self) -> Bar {
+        let growth = self.shared.touched_kib;
+        let note = growth.map_or(String::new(), |of| format!("{:.0} to {:.0} KiB", of.first, of.last));
+        let short = growth.is_none().then_some("too short a run");
+        let value = growth.map(|growth| growth.growth_pct);
+        let name = format!("growth of shared memory taken, after {SETTLE_S:.0} s");
+        Bar::at_most(&name, value, self.bars.no_faults.shared_memory_growth_pct, "%").noting(note).unless(short)
+    }
+
+    fn constants(&self) -> [Bar; 5] {
         let changed = |of: fn(&ProcessRecord) -> Option<Steady>| {
             let of = self.processes.iter().map(|process| (process, of(process)));
             let (mut most, mut note) = (None, String::new());
@@ -175,9 +185,8 @@ impl Facts<'_> {
         let short = |value: Option<f64>| value.is_none().then_some("too short a run");
         let (files, files_note) = changed(|of| of.files);
         let (threads, threads_note) = changed(|of| of.threads);
-        let shared = self.shared.map(|Steady { first, last, .. }| first.abs_diff(last) as f64);
-        let shared_note =
-            self.shared.map_or(String::new(), |of| format!("{} to {} KiB, {} at most", of.first, of.last, of.most));
+        let change = |of: Option<Steady>| of.map(|Steady { first, last, .. }| first.abs_diff(last) as f64);
+        let (objects, length) = (change(self.shared.objects), change(self.shared.length_kib));
         [
             Bar::at_most("change of file descriptors, the worst process", files, 0.0, "")
                 .noting(files_note)
@@ -185,7 +194,9 @@ impl Facts<'_> {
             Bar::at_most("change of threads, the worst process", threads, 0.0, "")
                 .noting(threads_note)
                 .unless(short(threads)),
-            Bar::at_most("change of shared memory", shared, 0.0, "KiB").noting(shared_note).unless(short(shared)),
+            Bar::at_most("change of objects in shared memory", objects, 0.0, "").unless(short(objects)),
+            Bar::at_most("change of shared memory's length", length, 0.0, "KiB").unless(short(length)),
+            self.touched(),
         ]
     }
 }

@@ -27,4 +27,4 @@ pub use matrix::{Invariants, Line, Matrix, Row};
 pub use run::Setup;
 pub use soak::{Settings, soak};
 pub use statistics::{Drift, Slope, Tally, WindowReport};
-pub use verdict::{Available, Bar, Grave, ObserverCost, Timeline, Verdict};
+pub use verdict::{Available, Bar, Grave, ObserverCost, SharedMemoryRecord, Timeline, Verdict};

@@ -7,12 +7,12 @@ use supervisor::Report;
 use crate::bars::Bars;
 use crate::campaign::{self, Campaign, Conductor, Cycle, ModeChanges, Step};
 use crate::judge::Facts;
-use crate::look::Observer;
+use crate::look::{Observer, SETTLE_S};
 use crate::matrix::{Matrix, Row};
 use crate::run::{Setup, leftovers};
 use crate::session::{Session, interrupts};
 use crate::statistics::Drift;
-use crate::verdict::{Available, Bar, Grave, ObserverCost, Timeline, Verdict};
+use crate::verdict::{Available, Bar, Grave, ObserverCost, SharedMemoryRecord, Timeline, Verdict};
 use crate::{Injection, SoakError};
 
 /// After the last fault of a campaign [s].
@@ -159,7 +159,11 @@ fn finish(
     let settle_s = (length_s / 3.0).min(300.0);
     let records = std::mem::take(&mut observer.records);
     let processes: Vec<_> = records.into_iter().map(|record| record.report(settle_s)).collect();
-    let shared = observer.shared.steady(settle_s);
+    let shared = SharedMemoryRecord {
+        objects: observer.shared_files.steady(settle_s),
+        length_kib: observer.shared_length.steady(settle_s),
+        touched_kib: observer.shared.growth(SETTLE_S),
+    };
     let windows = || observer.windows.iter().map(|(begin_ns, window)| (begin_ns as f64 / 1e9, window));
     let drift = Drift::of(windows());
     let available = available(&observer);
@@ -171,7 +175,7 @@ fn finish(
         available: &available,
         drift: &drift,
         processes: &processes,
-        shared,
+        shared: &shared,
         restarts: observer.restarts,
         rows: &ended.rows,
         reports: &reports,
@@ -202,7 +206,7 @@ fn finish(
         bars,
         availability: Some(available),
         drift: Some(drift),
-        shared_memory_kib: shared,
+        shared_memory: shared,
         restarts: observer.restarts,
         adoptions,
         events: events.clone(),

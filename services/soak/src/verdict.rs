@@ -5,7 +5,7 @@ use supervisor::LedgerReport;
 
 use crate::Injection;
 use crate::campaign::{Cycle, Step};
-use crate::look::{ProcessRecord, Steady};
+use crate::look::{Growth, ProcessRecord, Steady};
 use crate::matrix::{Matrix, Row};
 use crate::statistics::{Drift, Tally, WindowReport};
 
@@ -40,8 +40,8 @@ pub struct Verdict {
     pub drift: Option<Drift>,
     /// The processes: memory, file descriptors, threads.
     pub processes: Vec<ProcessRecord>,
-    /// Shared memory [KiB]; null where the run was too short.
-    pub shared_memory_kib: Option<Steady>,
+    /// The chain's objects in shared memory.
+    pub shared_memory: SharedMemoryRecord,
     /// Processes started in place of others.
     pub restarts: u64,
     /// Supervisors that followed one that died.
@@ -93,6 +93,17 @@ pub struct Available {
     pub longest_run: u64,
     /// Whole answers that were older than allowed.
     pub stale: u64,
+}
+
+/// The chain's objects in shared memory; null where the run was too short.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct SharedMemoryRecord {
+    /// How many.
+    pub objects: Option<Steady>,
+    /// Their length: memory that they may take [KiB].
+    pub length_kib: Option<Steady>,
+    /// Memory that they take, from five minutes on.
+    pub touched_kib: Option<Growth>,
 }
 
 /// Something that had to be reached.

@@ -4,7 +4,7 @@ use std::process::{Child, Stdio};
 
 use crate::Injection;
 use crate::look::{Looked, Observer};
-use crate::matrix::{Open, Row};
+use crate::matrix::{Baseline, Open, Row};
 use crate::run::encke;
 
 /// How long a second injection is tried, while its target has no process [ns].
@@ -18,6 +18,7 @@ pub(crate) struct Conductor {
     settle_ns: u64,
     coming: VecDeque<Injection>,
     open: Option<Open>,
+    first: Option<Baseline>,
     again: Option<Again>,
     /// Of faults that are over.
     pub(crate) rows: Vec<Row>,
@@ -40,6 +41,7 @@ impl Conductor {
             settle_ns: (settle_s * 1e9) as u64,
             coming: list.into(),
             open: None,
+            first: None,
             again: None,
             rows: Vec::new(),
             last_whole_ns: None,
@@ -84,7 +86,8 @@ impl Conductor {
         observer.marks.faults.add(now_ns, now_ns + lasts_ns + self.settle_ns);
         self.supervisor_may_be_dead = injection.ends_supervisor() || injection.fault == "shared-memory-gone";
         self.again = injection.again_ms.map(|ms| Again { from_ns: now_ns + (ms * 1e6) as u64, child: None });
-        let mut open = Open::new(injection, None, now_ns, self.last_whole_ns, observer);
+        let first = self.first.get_or_insert_with(|| Baseline::of(observer));
+        let mut open = Open::new(injection, None, now_ns, self.last_whole_ns, first, observer);
         match command(&open.injection, &self.instance) {
             Ok(child) => open.child = Some(child),
             Err(cause) => open.refused = Some(cause),

@@ -16,7 +16,7 @@ use serde_json::Value;
 use super::DayFile;
 use super::conduct::said;
 use super::file::StepFile;
-use crate::matrix::{Open, Row};
+use crate::matrix::{Baseline, Open, Row};
 use crate::run::encke;
 use crate::session::Session;
 use crate::soak::{Interrupted, Settings};
@@ -226,7 +226,8 @@ fn inject(words: &[String], settings: &Settings, session: &mut Session<'_>) -> R
     let settle_ns = (settings.bars.settle_s * 1e9) as u64;
     session.observer.marks.after_injections.add(now_ns, now_ns + settle_ns);
     session.observer.marks.faults.add(now_ns, now_ns + settle_ns);
-    let mut open = Open::new(injection, Some(child), now_ns, Some(now_ns), &session.observer);
+    let mut open =
+        Open::new(injection, Some(child), now_ns, Some(now_ns), &Baseline::of(&session.observer), &session.observer);
     let mut until_ns = now_ns + (FAULT_S * 1e9) as u64;
     while session.goes_on() && clock::now_ns() < until_ns {
         let (looked, now_ns) = session.turn(may_be_dead)?;

@@ -82,7 +82,12 @@ pub(crate) struct Observer<'a> {
     pub(crate) records: Vec<Record>,
     /// Of each process the latest looks.
     latest: Vec<VecDeque<Use>>,
+    /// Shared memory taken [KiB].
     pub(crate) shared: Level,
+    /// Its length [KiB].
+    pub(crate) shared_length: Level,
+    /// Its objects.
+    pub(crate) shared_files: Level,
     latest_shared: VecDeque<SharedMemory>,
     pub(crate) windows: Buckets<Window>,
     pub(crate) samples: Buckets<Sampled>,
@@ -137,6 +142,8 @@ impl<'a> Observer<'a> {
             pages,
             records: names.iter().map(|name| Record::new(name, stretch_s)).collect(),
             shared: Level::new(stretch_s),
+            shared_length: Level::new(stretch_s),
+            shared_files: Level::new(stretch_s),
             latest_shared: VecDeque::new(),
             windows: Buckets::new(window_ns as u64, MOST_WINDOWS),
             samples: Buckets::new(SAMPLE_NS, MOST_SAMPLES),
@@ -250,6 +257,8 @@ impl<'a> Observer<'a> {
         let pids: Vec<u64> = self.pages.all().map(|(_, counts)| counts.pid).chain([supervisor]).collect();
         let shared = SharedMemory::of(self.instance);
         self.shared.add(t_s, shared.kib);
+        self.shared_length.add(t_s, shared.length_kib);
+        self.shared_files.add(t_s, shared.files);
         push(&mut self.latest_shared, shared);
         let sampled = self.samples.at(now_ns.saturating_sub(self.started_ns));
         sampled.looks += 1;
@@ -283,7 +292,9 @@ impl<'a> Observer<'a> {
         let tally = self.availability.overall;
         let latency_ms = self.sink().map_or(0.0, |sink| sink.latency_ns as f64 / 1e6);
         let step = self.pages.of(SOURCE).map_or(0, |source| source.step);
-        row.extend([shared.files, shared.kib, tally.due, tally.in_time].map(|value| value.to_string()));
+        row.extend(
+            [shared.files, shared.length_kib, shared.kib, tally.due, tally.in_time].map(|value| value.to_string()),
+        );
         row.push(format!("{latency_ms:.3}"));
         row.extend([lost, dropped, rejected, self.restarts, step].map(|value| value.to_string()));
         self.csv.row(&row);
@@ -306,10 +317,14 @@ impl<'a> Observer<'a> {
         all.filter_map(|(record, uses)| least(uses).map(|(pid, files)| (record.name.clone(), pid, files))).collect()
     }
 
-    /// Shared memory over the latest looks: the least objects, the least memory.
+    /// Shared memory over the latest looks: the least of each.
     pub(crate) fn shared_memory(&self) -> SharedMemory {
         let least = |of: fn(&SharedMemory) -> u64| self.latest_shared.iter().map(of).min().unwrap_or(0);
-        SharedMemory { files: least(|all| all.files), kib: least(|all| all.kib) }
+        SharedMemory {
+            files: least(|all| all.files),
+            length_kib: least(|all| all.length_kib),
+            kib: least(|all| all.kib),
+        }
     }
 
     /// Events by name, and numbers of the log that nobody saw.
@@ -337,6 +352,7 @@ fn columns(names: &[String]) -> Vec<String> {
     }
     let more = [
         "shared_files",
+        "shared_length_kib",
         "shared_kib",
         "sweeps_due",
         "sweeps_in_time",

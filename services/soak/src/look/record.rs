@@ -63,8 +63,8 @@ impl Level {
         Some(Steady { first: first.least, last: last.least, most })
     }
 
-    /// Growth from `from_s` on.
-    fn growth(&self, from_s: f64) -> Option<Growth> {
+    /// Growth from `from_s` on; none where there is too little after that.
+    pub(crate) fn growth(&self, from_s: f64) -> Option<Growth> {
         let whole = self.whole(from_s);
         if whole.len() < LEAST_STRETCHES {
             return None;

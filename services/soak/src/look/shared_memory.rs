@@ -9,7 +9,9 @@ use transport::Instance;
 pub(crate) struct SharedMemory {
     /// Objects.
     pub(crate) files: u64,
-    /// Memory that they take, which is what was touched of them.
+    /// Their length: memory that they may take.
+    pub(crate) length_kib: u64,
+    /// Memory that they take, which is what was touched of them so far.
     pub(crate) kib: u64,
 }
 
@@ -21,6 +23,7 @@ impl SharedMemory {
             // It may be gone by now.
             let Ok(meta) = fs::metadata(Path::new("/dev/shm").join(name)) else { continue };
             all.files += 1;
+            all.length_kib += meta.len() / 1024;
             all.kib += meta.blocks() / 2; // of 512 bytes
         }
         all

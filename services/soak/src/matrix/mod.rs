@@ -4,6 +4,6 @@ mod open;
 mod row;
 mod table;
 
-pub(crate) use open::Open;
+pub(crate) use open::{Baseline, Open};
 pub use row::{Invariants, Row};
 pub use table::{Line, Matrix};

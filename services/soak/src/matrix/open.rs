@@ -8,8 +8,9 @@ use crate::Injection;
 use crate::look::{Observer, SharedMemory};
 use crate::statistics::Answer;
 
-/// Memory that shared memory may have more than before: its parts are touched one after the other.
-const SHARED_MEMORY_GROWTH: f64 = 1.1;
+/// File descriptors that a process may have more than before the first fault. Who tells another that something was sent opens the
+/// way there when it does so for the first time, the supervisor after a death; so each process comes to have a few more, once.
+const FIRST_TIME_FILES: u64 = 8;
 
 /// A fault that is under way, watched until the next one.
 pub(crate) struct Open {
@@ -25,6 +26,19 @@ pub(crate) struct Open {
     /// The longest time without a whole answer, and its end [ns].
     gap: (u64, u64),
     pub(crate) refused: Option<String>,
+}
+
+/// What there was before the first of all faults.
+pub(crate) struct Baseline {
+    files: Vec<(String, u64, u64)>,
+    shared: SharedMemory,
+}
+
+impl Baseline {
+    /// Now.
+    pub(crate) fn of(observer: &Observer<'_>) -> Self {
+        Self { files: observer.files(), shared: observer.shared_memory() }
+    }
 }
 
 /// What there was before.
@@ -52,12 +66,14 @@ fn pids(observer: &Observer<'_>) -> Vec<(String, u64)> {
 }
 
 impl Open {
-    /// The fault is injected at `now_ns`; `last_whole_ns` is the time of the last whole answer.
+    /// The fault is injected at `now_ns`; `last_whole_ns` is the time of the last whole answer, `first` what there was before the
+    /// first fault.
     pub(crate) fn new(
         injection: Injection,
         child: Option<Child>,
         now_ns: u64,
         last_whole_ns: Option<u64>,
+        first: &Baseline,
         observer: &Observer<'_>,
     ) -> Self {
         let hit = injection.stage.as_deref().and_then(|stage| observer.pages.of(stage));
@@ -71,8 +87,8 @@ impl Open {
             pids: pids(observer),
             life: hit.map(|counts| counts.incarnation),
             settled: hit.map(|counts| counts.settled_incarnation),
-            files: observer.files(),
-            shared: observer.shared_memory(),
+            files: first.files.clone(),
+            shared: first.shared,
         };
         Self {
             injection,
@@ -137,10 +153,10 @@ impl Open {
             .iter()
             .all(|(name, pid)| !spared(name) || now.iter().any(|(other, other_pid)| other == name && other_pid == pid));
         let files = observer.files();
-        let files_back =
-            before.files.iter().all(|(name, _, most)| files.iter().all(|(other, _, now)| other != name || now <= most));
+        let files_back = before.files.iter().all(|(name, _, most)| {
+            files.iter().all(|(other, _, now)| other != name || *now <= most + FIRST_TIME_FILES)
+        });
         let (was, is) = (before.shared, observer.shared_memory());
-        let most_kib = was.kib as f64 * SHARED_MEMORY_GROWTH;
         let since_ms = |ns: u64, from_ns: u64| ns.saturating_sub(from_ns) as f64 / 1e6;
         let period_ns = observer.availability.period_ns();
         Row {
@@ -163,7 +179,7 @@ impl Open {
                 neighbours_kept,
                 none_stale: observer.stale == before.stale,
                 files_back,
-                shared_memory_back: is.files <= was.files && is.kib as f64 <= most_kib,
+                shared_memory_back: is.files <= was.files && is.length_kib <= was.length_kib,
             },
             refused: self.refused,
         }

@@ -47,9 +47,9 @@ pub struct Invariants {
     pub neighbours_kept: bool,
     /// No whole answer was older than allowed.
     pub none_stale: bool,
-    /// As many file descriptors as before, at most.
+    /// As many file descriptors as before the first fault, and a few that are opened once.
     pub files_back: bool,
-    /// As many objects in shared memory as before, and not a tenth more memory.
+    /// As many objects in shared memory as before the first fault, and no longer ones.
     pub shared_memory_back: bool,
 }
 
