@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-pub(crate) use look::{LiveArgs, ReportArgs, TopArgs, ViewArgs};
+pub(crate) use look::{EventsArgs, LiveArgs, ReportArgs, SeverityArg, TopArgs, ViewArgs};
 use notes::*;
 pub(crate) use operate::{CtlArgs, Fault, InjectArgs, Request};
 use runtime::Pace;
@@ -61,7 +61,9 @@ pub(crate) enum Command {
     #[command(after_help = SOAK_NOTES)]
     Soak(Box<SoakArgs>),
     /// Look at a running chain, let it take a step, or stop it.
-    #[command(after_help = "Examples:\n  encke ctl status --json\n  encke ctl stop --instance flight-1")]
+    #[command(
+        after_help = "Examples:\n  encke ctl status --json\n  encke ctl events --follow --severity warning\n  encke ctl stop --instance flight-1"
+    )]
     Ctl(CtlArgs),
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]
@@ -141,6 +143,9 @@ pub(crate) struct RunArgs {
     /// Record sweeps, detections and more, to replay them or to look at them in Foxglove.
     #[arg(long, value_name = "FILE.mcap")]
     pub(crate) record: Option<PathBuf>,
+    /// Write what happens, one JSON line an event: a copy of the log that `encke ctl events` shows; - is standard output.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) events: Option<PathBuf>,
     /// Write the summary as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,

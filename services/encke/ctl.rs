@@ -4,17 +4,22 @@ use rustix::process::{Pid, Signal, kill_process};
 use supervisor::{Command, Status, Tables, Word};
 use transport::Instance;
 
-use crate::assets::Assets;
-use crate::cli::{CtlArgs, Request};
-use crate::{Failure, dispatch, instances, run};
+use crate::cli::{CtlArgs, EventsArgs, Request};
+use crate::{Failure, events, instances};
 
 /// Looks at a running chain, or commands it.
 pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
-    if let Some(contradiction) = args.contradiction() {
-        return Err(Failure::start(contradiction));
+    if args.request == Request::Events {
+        return events::events(args.instance.as_deref(), args.json, &args.events);
+    }
+    if args.events != EventsArgs::default() {
+        return Err(Failure::start(
+            "--follow, --since, --severity, --file and --dictionary are for `encke ctl events`",
+        ));
     }
     let (instance, running) = instances::find(args.instance.as_deref())?;
-    let command = match args.request {
+    match args.request {
+        Request::Events => Ok(()),
         Request::Status => {
             let status = supervisor::status(&instance).map_err(Failure::start)?;
             let text = if args.json {

@@ -10,6 +10,7 @@ mod ctl;
 mod dispatch;
 mod doctor;
 mod evaluate;
+mod events;
 mod inject;
 mod instances;
 mod live;

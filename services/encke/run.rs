@@ -31,6 +31,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         ("--labels", plan.outputs.labels.as_deref()),
         ("--trace", plan.outputs.trace.as_deref()),
         ("--record", plan.outputs.record.as_deref()),
+        ("--events", plan.outputs.events.as_deref()),
         ("--report", args.report.as_deref()),
     ];
     outputs::check(&files, &plan.source.from)?;
@@ -100,6 +101,7 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
             labels: absolute(&args.labels)?,
             trace: absolute(&args.trace)?,
             record: absolute(&args.record)?,
+            events: absolute(&args.events)?,
         },
         config_dirs: assets.dirs().to_vec(),
         chain,

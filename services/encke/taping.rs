@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use events::{Reader, Severity};
 use messages::{Clusters, Descriptors, Detections, Sweep, Trace, Truth};
-use runtime::{Pace, Plan, Shell, TAPE};
+use runtime::{Pace, Plan, Shell};
 use stage::{SinkError, Tap};
-use supervisor::Status;
-use tape::{About, Event, Level, Tape, TapeFile, Topic};
+use tape::{About, Counts, Event, Level, Tape, TapeFile, Topic};
 use transport::Instance;
 
 use crate::Failure;
@@ -19,7 +19,10 @@ pub(crate) struct Taping {
     wants_between: (bool, bool),
     instance: Instance,
     counts_path: PathBuf,
-    before: Option<Status>,
+    /// The log of the run.
+    events: Reader,
+    /// Write errors, and the last of them.
+    failures: (u64, Option<String>),
 }
 
 /// The tape's settings, as `tape.toml` has them.
@@ -69,23 +72,30 @@ impl Taping {
             wants_between,
             instance: shell.instance().clone(),
             counts_path: Plan::counts_path(shell.instance(), shell.incarnation()),
-            before: None,
+            events: Reader::new(&Plan::events_path(shell.instance()), recorded_events(shell)),
+            failures: (0, None),
         })
     }
 
-    /// Notes the chain's state, and as events what has changed since the last time.
+    /// Notes the chain's state, and what has happened since the last time.
     fn look_at_chain(&mut self, utc_ns: u64) {
         // The supervisor may be taking the instance down.
-        let Ok(now) = supervisor::status(&self.instance) else { return };
-        if let Ok(json) = serde_json::to_vec(&now) {
+        if let Ok(now) = supervisor::status(&self.instance)
+            && let Ok(json) = serde_json::to_vec(&now)
+        {
             self.tape.status(utc_ns, &json);
         }
-        if let Some(before) = &self.before {
-            for (name, message) in changes(before, &now) {
-                self.tape.event(utc_ns, &Event { level: Level::Warning, name, message: &message });
-            }
-        }
-        self.before = Some(now);
+        let tape = &mut self.tape;
+        self.events.read(|event| {
+            let level = match event.severity {
+                Severity::Info => Level::Info,
+                Severity::Warning => Level::Warning,
+                Severity::Error => Level::Error,
+                Severity::Critical => Level::Fatal,
+            };
+            let (name, word, number) = (event.stage.as_str(), event.name.as_str(), event.number);
+            tape.event(event.utc_ns, &Event { level, name, word, number, message: &event.text });
+        });
     }
 
     fn save_counts(&self) {
@@ -97,23 +107,15 @@ impl Taping {
     }
 }
 
-/// What is worth an event between two looks: its kind, and what happened.
-fn changes(before: &Status, now: &Status) -> Vec<(&'static str, String)> {
-    let mut found = Vec::new();
-    for (then, stage) in before.stages.iter().zip(&now.stages) {
-        if stage.restarts > then.restarts {
-            found.push(("restart", format!("{}: life {}", stage.stage, stage.restarts + 1)));
-        }
-        for (what, was, is) in [("dropped", then.dropped, stage.dropped), ("lost", then.lost, stage.lost)] {
-            if is > was {
-                found.push(("loss", format!("{}: {} parts {what}, {is} in all", stage.stage, is - was)));
-            }
-        }
-    }
-    if before.step != now.step {
-        found.push(("step", format!("from {} to {}", before.step, now.step)));
-    }
-    found
+/// Events that earlier lives have in their files: this one goes on with the next. Each is one message.
+fn recorded_events(shell: &Shell) -> u64 {
+    let of_life = |life: u32| {
+        let text = std::fs::read(Plan::counts_path(shell.instance(), life)).ok()?;
+        let counts: Counts = serde_json::from_slice(&text).ok()?;
+        let events = counts.of(Topic::Events)?;
+        Some(events.messages + events.removed)
+    };
+    (1..shell.incarnation()).filter_map(of_life).sum()
 }
 
 impl Tap for Taping {
@@ -141,10 +143,14 @@ impl Tap for Taping {
         self.tape.truth(utc_ns, trace, truth);
     }
 
-    fn missed(&mut self, message: &'static str, parts: u64) {
-        tracing::warn!(message, parts, "the tape was too slow: what is lost is counted by topic");
-        let message = format!("{parts} parts of {message} overflowed the queue");
-        self.tape.event(runtime::clock::utc_ns(), &Event { level: Level::Warning, name: TAPE, message: &message });
+    fn files(&mut self) -> (u64, u64) {
+        let Counts { files, failure, .. } = self.tape.counts();
+        let (failures, last) = &mut self.failures;
+        if failure.is_some() && failure != *last {
+            *failures += 1;
+            *last = failure;
+        }
+        (files, *failures)
     }
 
     fn tick(&mut self, utc_ns: u64) {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::parse_duration;
 
@@ -19,6 +19,35 @@ pub(crate) struct ReportArgs {
     /// Print the figures as JSON instead: those of a recording are worked out from it.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Options of `encke ctl events`.
+#[derive(Args, Clone, Debug, Default, PartialEq)]
+pub(crate) struct EventsArgs {
+    /// events: go on with what happens, until the chain ends.
+    #[arg(long)]
+    pub(crate) follow: bool,
+    /// events: only from this number on.
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) since: Option<u64>,
+    /// events: only those that are at least so grave.
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub(crate) severity: Option<SeverityArg>,
+    /// events: of a file that `encke run --events` wrote, instead of a running chain.
+    #[arg(long, value_name = "FILE.jsonl", conflicts_with = "instance")]
+    pub(crate) file: Option<PathBuf>,
+    /// events: print what can happen, as a table, instead.
+    #[arg(long, conflicts_with_all = ["follow", "since", "severity", "file", "instance"])]
+    pub(crate) dictionary: bool,
+}
+
+/// `--severity`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SeverityArg {
+    Info,
+    Warning,
+    Error,
+    Critical,
 }
 
 /// Options of `encke top`.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use super::parse_duration;
+use super::{EventsArgs, parse_duration};
 
 /// A fault that can be put into a running chain.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -57,6 +57,8 @@ pub(crate) enum Request {
     Stop,
     /// With --pace step: one more sweep.
     Step,
+    /// What happened, from the log of the run.
+    Events,
 }
 
 /// Options of `encke ctl`.
@@ -73,6 +75,8 @@ pub(crate) struct CtlArgs {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) events: EventsArgs,
 }
 
 impl CtlArgs {

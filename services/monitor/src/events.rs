@@ -1,12 +1,9 @@
-//! What changed between two looks, in words.
+//! What happened, from the log of the run, for people.
 
 use std::collections::VecDeque;
 
-use messages::{Step, Verdict};
-use runtime::page::State;
+use events::{CHAIN, Event, Severity};
 
-use crate::attached::Facts;
-use crate::sample::{Sample, StageSample};
 use crate::top::EventView;
 
 /// Events that are remembered.
@@ -14,24 +11,14 @@ const MOST: usize = 200;
 /// The same at the same stage within this time is one event with a larger number [s].
 const MERGE_S: f64 = 5.0;
 
-/// What can happen again and again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// Never merged.
-    Once,
-    Lost,
-    Dropped,
-    Rejected(usize),
-    Overrun,
-    Miss,
-}
-
 #[derive(Clone, Debug)]
-struct Event {
+struct Line {
     at_s: f64,
     sweep: u64,
     stage: String,
-    kind: Kind,
+    /// Its number in the dictionary; 0 for what this viewer says itself.
+    id: u32,
+    grave: bool,
     count: u64,
     text: String,
 }
@@ -39,104 +26,63 @@ struct Event {
 /// The latest events.
 #[derive(Default)]
 pub(crate) struct Events {
-    events: VecDeque<Event>,
+    lines: VecDeque<Line>,
 }
 
-/// Uptime [s] and sweep of a look.
-pub(crate) type Moment = (f64, u64);
-
 impl Events {
-    fn add(&mut self, (at_s, sweep): Moment, stage: &str, kind: Kind, count: u64, text: String) {
-        let same = |event: &&mut Event| event.stage == stage && event.kind == kind && at_s - event.at_s < MERGE_S;
-        if kind != Kind::Once
-            && let Some(event) = self.events.iter_mut().rev().find(same)
-        {
-            event.count += count;
-            event.text = text;
+    /// Adds an event of the log, `at_s` after the supervisor's start. What happens again soon is one line with a larger
+    /// number, and the latest words.
+    pub(crate) fn add(&mut self, at_s: f64, event: &Event) {
+        let count = event.unsaid.saturating_add(1);
+        let same = |line: &&mut Line| line.stage == event.stage && line.id == event.id && at_s - line.at_s < MERGE_S;
+        let repeats = event.severity == Severity::Warning;
+        if let Some(line) = self.lines.iter_mut().rev().find(same).filter(|_| repeats) {
+            line.count = line.count.saturating_add(count);
+            line.text = words(event);
             return;
         }
-        self.events.push_back(Event { at_s, sweep, stage: stage.to_owned(), kind, count, text });
-        if self.events.len() > MOST {
-            self.events.pop_front();
-        }
-    }
-
-    fn once(&mut self, moment: Moment, stage: &str, text: String) {
-        self.add(moment, stage, Kind::Once, 1, text);
+        self.push(Line {
+            at_s,
+            sweep: event.sweep,
+            stage: event.stage.clone(),
+            id: event.id,
+            grave: event.severity >= Severity::Warning,
+            count,
+            text: words(event),
+        });
     }
 
     /// The instance runs again.
     pub(crate) fn add_renewal(&mut self) {
-        self.once((0.0, 0), "chain", "the instance was started anew".to_owned());
+        let text = "the instance was started anew".to_owned();
+        self.push(Line { at_s: 0.0, sweep: 0, stage: CHAIN.to_owned(), id: 0, grave: false, count: 1, text });
     }
 
-    /// Adds what changed from one look to the next.
-    pub(crate) fn compare(&mut self, facts: &Facts, now: Moment, before: &Sample, after: &Sample) {
-        for (name, (before, after)) in facts.stages.iter().zip(before.stages.iter().zip(&after.stages)) {
-            self.compare_stage(now, name, before, after);
+    fn push(&mut self, line: Line) {
+        self.lines.push_back(line);
+        if self.lines.len() > MOST {
+            self.lines.pop_front();
         }
-        let step = |sample: &Sample| sample.stages.first().map_or(0, |source| source.counts.step) as u32;
-        if step(before) != step(after) {
-            let name = |sample| Step::from_number(step(sample)).name();
-            self.once(now, "chain", format!("step {} → {}", name(before), name(after)));
-        }
-    }
-
-    fn compare_stage(&mut self, now: Moment, name: &str, before: &StageSample, after: &StageSample) {
-        let (old, new) = (&before.counts, &after.counts);
-        if before.usage.is_some() && (after.usage.is_none() || old.pid != new.pid) && new.state != State::Stopped {
-            self.once(now, name, format!("process {} is gone", old.pid));
-        }
-        if new.incarnation > old.incarnation.max(1) {
-            self.once(now, name, format!("restarted: life {}, process {}", new.incarnation, new.pid));
-        }
-        if new.state != old.state && matches!(new.state, State::Ended | State::Stopped) {
-            self.once(now, name, new.state.name().to_owned());
-        }
-        let mut grew = |kind, old: u64, new: u64, text: &str| {
-            if new > old {
-                self.add(now, name, kind, new - old, text.to_owned());
-            }
-        };
-        grew(Kind::Lost, old.lost, new.lost, "lost with a process");
-        grew(Kind::Dropped, old.dropped, new.dropped, "dropped, queue full");
-        grew(Kind::Overrun, old.overruns, new.overruns, "over its budget");
-        for (place, verdict) in Verdict::ALL.into_iter().enumerate() {
-            let text = format!("rejected, {}", verdict.name());
-            grew(Kind::Rejected(place), old.rejected[place], new.rejected[place], &text);
-        }
-    }
-
-    /// Adds a sweep that was late or not answered.
-    pub(crate) fn add_miss(&mut self, at: Moment, facts: &Facts, latency_ns: Option<u64>) {
-        let text = match latency_ns {
-            Some(ns) => format!("{:.1} ms of {:.0}", ns as f64 / 1e6, facts.deadline_ms),
-            None => "not answered".to_owned(),
-        };
-        self.add(at, "chain", Kind::Miss, 1, text);
     }
 
     /// For people, oldest first.
     pub(crate) fn views(&self) -> Vec<EventView> {
-        self.events.iter().map(Event::view).collect()
+        self.lines.iter().map(Line::view).collect()
     }
 }
 
-fn times(count: u64) -> String {
-    if count == 1 { "once".to_owned() } else { format!("{count} times") }
+fn words(event: &Event) -> String {
+    let name = event.name.replace('_', " ");
+    if event.text.is_empty() { name } else { format!("{name}: {}", event.text) }
 }
 
-impl Event {
+impl Line {
     fn view(&self) -> EventView {
-        let what = match self.kind {
-            Kind::Once => self.text.clone(),
-            Kind::Miss if self.count == 1 => format!("deadline missed: {}", self.text),
-            Kind::Miss => format!("{} deadlines missed, last {}", self.count, self.text),
-            Kind::Overrun => format!("{}: {}", self.text, times(self.count)),
-            _ if self.count == 1 => format!("{}: 1 part", self.text),
-            _ => format!("{}: {} parts", self.text, self.count),
+        let Self { at_s, sweep, grave, .. } = *self;
+        let what = match self.count {
+            1 => self.text.clone(),
+            count => format!("{} ({count} times)", self.text),
         };
-        let grave = matches!(self.kind, Kind::Lost | Kind::Dropped | Kind::Miss) || what.ends_with("is gone");
-        EventView { at_s: self.at_s, sweep: self.sweep, stage: self.stage.clone(), what, grave }
+        EventView { at_s, sweep, stage: self.stage.clone(), what, grave }
     }
 }

@@ -170,6 +170,12 @@ impl Sink for Recorder {
         self.order.map_or(0, |order| order.wanted_attempt())
     }
 
+    fn failed_files(&self) -> u64 {
+        let lost = [&self.progress.lost_detections, &self.progress.lost_labels];
+        let trace = self.trace.as_ref().is_some_and(|trace| trace.counts().failed);
+        lost.into_iter().filter(|lost| lost.load(Ordering::Relaxed) > 0).count() as u64 + u64::from(trace)
+    }
+
     /// Writes the statistics so far, where the settings name a file for them.
     fn checkpoint(&mut self) -> Result<(), SinkError> {
         let Some(path) = &self.statistics_file else { return Ok(()) };

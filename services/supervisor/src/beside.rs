@@ -47,7 +47,7 @@ impl RecordingReport {
 /// The tape's process, where something is recorded.
 pub(crate) struct Tape {
     pub(crate) process: Watched,
-    stopped: Option<String>,
+    pub(crate) stopped: Option<String>,
 }
 
 impl Tape {
@@ -85,7 +85,6 @@ impl Tape {
 
     /// It stays away: nobody waits for it any more.
     fn give_up(&mut self, reason: String) {
-        tracing::error!(reason, "nothing more is recorded");
         self.process.told = true;
         self.process.page.next_ordinal_out.set(u64::MAX);
         self.stopped = Some(reason);
@@ -120,12 +119,17 @@ impl Watch<'_> {
         if ended == Ended::Code(CANNOT_START) && !self.begun {
             return Err(SupervisorError::Refused(TAPE.to_owned()));
         }
-        tracing::warn!(?ended, "the tape died");
+        let pid = page.pid.get();
+        self.tell_end_of(TAPE, pid, ended);
+        let Some(tape) = &mut self.tape else { return Ok(()) };
         if ended == Ended::Code(CANNOT_START) {
             tape.give_up("the tape could not start again".to_owned());
         } else if tape.process.restarts.allow(clock::now_ns()) {
-            let _for_the_child = self.as_before.as_ref().map(runtime::realtime::AsBefore::for_a_moment);
+            let for_the_child = self.as_before.as_ref().map(runtime::realtime::AsBefore::for_a_moment);
             tape.process.start()?;
+            drop(for_the_child);
+            let restarts = tape.process.restarts.total;
+            self.tell_restart(TAPE, restarts);
         } else {
             let budget = self.plan.chain.restart_budget;
             tape.give_up(format!("the tape died more than {} times within {} s", budget.restarts, budget.window_s));

@@ -4,6 +4,7 @@ use recorder::Snapshot;
 use runtime::page::Page;
 use runtime::{Plan, clock};
 
+use crate::events_report::EventsReport;
 use crate::ledger;
 use crate::overload::OverloadReport;
 use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS};
@@ -40,6 +41,7 @@ impl Watch<'_> {
     }
 
     pub(crate) fn report(mut self) -> Report {
+        self.end_log();
         let overload = self.overload_report();
         let duration_s = (clock::now_ns() - self.started_ns) as f64 / 1e9;
         self.usage.update(std::process::id(), true);
@@ -65,11 +67,8 @@ impl Watch<'_> {
             noise_ms: self.noise.finish(),
             realtime_refused: std::mem::take(&mut self.refused),
             stopped: self.failed.clone(),
-            mode: self.modes.mode(),
-            modes: self.modes.report,
-            safe_entered: self.safe_entered.clone(),
-            commands: self.commands_report(),
-            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, &self.plan)),
+            events: EventsReport::of(&self.log),
+            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, self.plan)),
         })
     }
 

@@ -7,7 +7,7 @@ use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::beside::RecordingReport;
-use crate::control::CommandsReport;
+use crate::events_report::EventsReport;
 use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;
 use crate::modes::{By, ModesReport};
@@ -55,6 +55,9 @@ pub struct Report {
     pub steps: BTreeMap<String, u64>,
     /// The processes, the source first, the supervisor last.
     pub processes: Vec<ProcessReport>,
+    /// What happened.
+    #[serde(default)]
+    pub events: EventsReport,
     /// Who had the cores.
     pub machine_load: MachineLoad,
     /// How late a thread that waits for the time is woken.
@@ -171,6 +174,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) noise_ms: Percentiles,
     pub(crate) realtime_refused: Vec<String>,
     pub(crate) stopped: Option<String>,
+    pub(crate) events: EventsReport,
     pub(crate) recording: Option<RecordingReport>,
     pub(crate) timeline: TimelineReport,
     pub(crate) mode: Mode,
@@ -214,6 +218,7 @@ impl Report {
             worst_sweeps: snapshot.worst,
             steps: snapshot.steps,
             processes,
+            events: facts.events,
             machine_load: facts.machine_load,
             noise_ms: facts.noise_ms,
             realtime_refused: facts.realtime_refused,

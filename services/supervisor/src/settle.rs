@@ -45,7 +45,7 @@ pub(crate) fn settle(node: &Node, services: &Services, stages: &mut [Watched], p
         // A process killed while it joined leaves a stub that holds no messages; it goes with the instance.
         tracing::debug!(stage = stage.name, uncleaned, "shared memory of a dead process could not be freed");
     }
-    tracing::warn!(
+    tracing::debug!(
         stage = stage.name,
         life = dead,
         ended = ?ended,

@@ -37,6 +37,9 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
     write_latency(text, report)?;
     write_overload(text, report)?;
     write_processes(text, report)?;
+    if let Some(line) = report.events.line() {
+        writeln!(text, "\nevents      {line}")?;
+    }
     write_machine(text, report)?;
     let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
     writeln!(text, "\ndetections  {}", classes.join("  "))?;

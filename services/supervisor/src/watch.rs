@@ -28,7 +28,8 @@ use crate::processes::Usage;
 use crate::progress::Progress;
 use crate::report::Report;
 use crate::services::Services;
-use crate::steering::SafeReport;
+use crate::settle::settle;
+use crate::telling::{Ears, open_log};
 use crate::timeline::Timeline;
 
 /// Between two looks at the pages.
@@ -107,11 +108,7 @@ pub(crate) struct Watch<'a> {
     /// The supervisor's own page.
     pub(crate) page: PageMap,
     pub(crate) log: Log,
-    pub(crate) executive: Executive,
-    /// Of all processes at the last look, the tape's last.
-    pub(crate) signs: Vec<Signs>,
-    /// The sample that watched values were taken from last.
-    pub(crate) sampled_ns: u64,
+    pub(crate) ears: Ears,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
     pub(crate) node: Node,
@@ -153,11 +150,16 @@ impl<'a> Watch<'a> {
     fn begin(house: &'a House, plan: &'a Plan, spawn: bool, signals: Receiver<i32>) -> Result<Self, SupervisorError> {
         let instance = house.instance();
         let node = Node::join(instance, "supervisor", plan.chain.queue_parts())?;
-        let adopts = house.adopted();
-        let services = if adopts.is_some() { Services::reopen(&node, plan)? } else { Services::create(&node, plan)? };
-        let Household { stages, tape, page } = Household::of(house, plan, spawn)?;
-        let events = Plan::events_path(instance);
-        let log = if adopts.is_some() { Log::resume(&events)? } else { Log::create(&events)? };
+        let services = Services::create(&node, plan)?;
+        let count = plan.stages().count();
+        let stages: Vec<Watched> =
+            (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
+        let tape = Tape::new(instance, plan, spawn)?;
+        let page = PageMap::create(&Plan::page_path(instance, SUPERVISOR))?;
+        page.pid.set(u64::from(std::process::id()));
+        let log = open_log(plan, &Plan::events_path(instance))?;
+        let beside = tape.iter().map(|tape: &Tape| &tape.process);
+        let ears = Ears::new(stages.iter().chain(beside).map(|process| &*process.page), &log);
         plan.write(instance)?;
         let now_ns = clock::now_ns();
         let budget = plan.chain.restart_budget;
@@ -172,7 +174,7 @@ impl<'a> Watch<'a> {
             tape,
             page,
             log,
-            manager: Manager::of_environment(),
+            ears,
             services,
             node,
             signals,
@@ -277,6 +279,7 @@ impl<'a> Watch<'a> {
                 return Err(error);
             }
         }
+        self.say(EventId::RunEnds, CHAIN, if self.stop_asked { "asked to stop" } else { "all is done" });
         let stopped = self.stop_in_order();
         self.progress.end();
         if stopped.is_err() {
@@ -351,6 +354,7 @@ impl<'a> Watch<'a> {
         self.recover_all(&ended)?;
         (0..self.stages.len()).rev().for_each(|position| self.name_losses(position));
         self.look_at_tape()?;
+        self.listen();
         self.climb();
         self.look_at_mode();
         let now_ns = clock::now_ns();
@@ -362,5 +366,75 @@ impl<'a> Watch<'a> {
         self.progress.show(now_ns, &self.stages);
         self.tell_manager();
         Ok(())
+    }
+
+    /// A stage's process has ended: settle its account and start its successor.
+    fn recover(&mut self, position: usize, ended: Ended) -> Result<(), SupervisorError> {
+        let lost_before = self.tell_death(position, ended);
+        if let Some(tape) = self.tape.as_ref().filter(|_| position == 0 || self.is_sink(position + 1)) {
+            tape.drain();
+        }
+        settle(&self.node, &self.services, &mut self.stages, position, ended);
+        self.tell_losses(position, lost_before);
+        let stage = &mut self.stages[position];
+        if stage.told {
+            return Ok(());
+        }
+        if ended == Ended::Code(CANNOT_START) {
+            if !self.begun {
+                return Err(SupervisorError::Refused(stage.name.clone()));
+            }
+            self.failed.get_or_insert(format!("stage {:?} could not start again: the chain was stopped", stage.name));
+            stage.told = true;
+            return Ok(());
+        }
+        if !stage.restarts.allow(clock::now_ns()) {
+            let budget = self.plan.chain.restart_budget;
+            self.failed.get_or_insert(format!(
+                "stage {:?} died more than {} times within {} s: the chain was stopped",
+                stage.name, budget.restarts, budget.window_s
+            ));
+            stage.told = true;
+            return Ok(());
+        }
+        stage.recovering = true;
+        self.timeline.restarted(clock::now_ns(), &stage.name, ended);
+        // A child inherits the seat of the one who starts it.
+        let for_the_child = self.as_before.as_ref().map(AsBefore::for_a_moment);
+        stage.start()?;
+        drop(for_the_child);
+        let (name, restarts) = (stage.name.clone(), stage.restarts.total);
+        self.tell_restart(&name, restarts);
+        Ok(())
+    }
+
+    /// A successor is connected: what was published before that and did not reach it is lost. It says so itself, once
+    /// it has looked; nobody waits for what will never come.
+    fn name_losses(&mut self, position: usize) {
+        if !self.stages[position].recovering || !self.stages[position].is_up() {
+            return;
+        }
+        self.stages[position].recovering = false;
+        if position > 0 {
+            let published = self.stages[position - 1].page.published.get();
+            self.stages[position].page.lose_below.set(published);
+            self.services.wake_readers_of(position - 1);
+        }
+    }
+
+    /// Tells the source how much of its work the chain is to leave out.
+    fn climb(&mut self) {
+        if self.plan.pace == Pace::Fast {
+            return;
+        }
+        let source = &self.stages[0].page;
+        let sweeps = source.published.get() / u64::from(self.plan.chain.sectors.max(1));
+        let trouble = Trouble::of(self.stages.iter().map(|stage| &*stage.page));
+        let before = self.ladder.step();
+        let Some(step) = self.ladder.look(sweeps, trouble) else { return };
+        source.step.set(self.ladder.step() as u64);
+        self.timeline.stepped(clock::now_ns(), &step);
+        self.tell_step(&step, self.ladder.step() > before);
+        self.overload.note(step);
     }
 }

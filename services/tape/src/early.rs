@@ -38,6 +38,8 @@ pub(crate) struct Kept {
     /// Of an event.
     level: Option<Level>,
     name: String,
+    word: String,
+    number: u64,
     /// An event's message, or JSON.
     bytes: Vec<u8>,
 }
@@ -49,7 +51,7 @@ impl Kept {
             // Came as a string.
             Some(level) => {
                 let message = std::str::from_utf8(&self.bytes).unwrap_or_default();
-                What::Event(Event { level, name: &self.name, message })
+                What::Event(Event { level, name: &self.name, word: &self.word, number: self.number, message })
             }
             None => What::Status(&self.bytes),
         };
@@ -69,11 +71,17 @@ impl Early {
         if self.kept.len() >= MOST {
             return false;
         }
-        let (level, name, bytes) = match moment.what {
-            What::Event(event) => (Some(event.level), event.name.to_owned(), event.message.as_bytes().to_vec()),
-            What::Status(json) => (None, String::new(), json.to_vec()),
-        };
-        self.kept.push(Kept { topic: moment.topic, utc_ns: moment.utc_ns, level, name, bytes });
+        let (topic, utc_ns) = (moment.topic, moment.utc_ns);
+        self.kept.push(match moment.what {
+            What::Event(Event { level, name, word, number, message }) => {
+                let (name, word, bytes) = (name.to_owned(), word.to_owned(), message.as_bytes().to_vec());
+                Kept { topic, utc_ns, level: Some(level), name, word, number, bytes }
+            }
+            What::Status(json) => {
+                let (name, word, bytes) = (String::new(), String::new(), json.to_vec());
+                Kept { topic, utc_ns, level: None, name, word, number: 0, bytes }
+            }
+        });
         true
     }
 
@@ -90,7 +98,7 @@ mod tests {
     #[test]
     fn a_bounded_number_of_moments_comes_out_as_it_came() {
         let mut sut = Early::default();
-        let event = Event { level: Level::Error, name: "replay", message: "torn at byte 7" };
+        let event = Event { level: Level::Error, name: "replay", word: "torn", number: 3, message: "at byte 7" };
         assert!(sut.keep(&Moment { topic: Topic::Events, utc_ns: 5, what: What::Event(event) }));
         assert!(sut.keep(&Moment { topic: Topic::Status, utc_ns: 6, what: What::Status(b"{}") }));
         let kept = sut.take();

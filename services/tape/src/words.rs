@@ -30,8 +30,12 @@ pub enum Level {
 pub struct Event<'a> {
     /// How grave it is.
     pub level: Level,
-    /// Who says it: a process of the chain.
+    /// Whom it is about: a process of the chain, or `chain`.
     pub name: &'a str,
+    /// Its word in the dictionary of events; goes where Foxglove has a source file.
+    pub word: &'a str,
+    /// Its number in the log of the run; goes where Foxglove has a line (its low 32 bits).
+    pub number: u64,
     /// What happened, one line.
     pub message: &'a str,
 }
@@ -50,7 +54,8 @@ pub(crate) fn put_event(event: &Event<'_>, sensor_time_ns: u64, out: &mut Vec<u8
         level: level as i32,
         message: event.message.into(),
         name: event.name.into(),
-        ..Log::default()
+        file: event.word.into(),
+        line: event.number as u32,
     };
     out.reserve(log.encoded_len());
     // Fails only where a buffer cannot grow; a vector does.
@@ -121,10 +126,12 @@ mod tests {
     #[test]
     fn an_event_keeps_its_words_level_and_time() {
         let mut out = Vec::new();
-        let event = Event { level: Level::Warning, name: "supervisor", message: "restarted the clusterer" };
+        let (name, word, message) = ("clusterer", "stage_restarted", "restart 1");
+        let event = Event { level: Level::Warning, name, word, number: (1 << 32) + 7, message };
         put_event(&event, 2_000_000_005, &mut out);
         let log = Log::decode(&out[..]).unwrap();
-        assert_eq!((log.name.as_str(), log.message.as_str()), ("supervisor", "restarted the clusterer"));
+        assert_eq!((log.name.as_str(), log.message.as_str()), (name, message));
+        assert_eq!((log.file.as_str(), log.line), (word, 7));
         assert_eq!((log.level(), log.timestamp), (Number::Warning, Some(timestamp(2_000_000_005))));
     }
 

@@ -157,7 +157,7 @@ fn events_and_status_wait_for_the_sensors_time() {
     let path = folder.path().join("run.mcap");
     let mut tape = start(settings(&[Topic::Events, Topic::Status]), &path, 1);
     let say = |tape: &mut Tape, message: &str| {
-        tape.event(UTC_NS, &Event { level: Level::Info, name: "supervisor", message });
+        tape.event(UTC_NS, &Event { level: Level::Info, name: "chain", word: "w", number: 0, message });
     };
     say(&mut tape, "started");
     tape.status(UTC_NS, br#"{"mode":"nominal"}"#);
@@ -176,7 +176,7 @@ fn events_of_a_run_without_a_sweep_are_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut tape = start(settings(&[Topic::Events]), &path, 1);
-    tape.event(UTC_NS, &Event { level: Level::Fatal, name: "supervisor", message: "no source" });
+    tape.event(UTC_NS, &Event { level: Level::Fatal, name: "chain", word: "w", number: 0, message: "no source" });
     tape.finish(UTC_NS).unwrap();
     assert_eq!(read(&path).len(), 1);
 }

@@ -95,6 +95,8 @@ dictionary! {
     SinkBehind = 304, Warning, "sink_behind", "{a} parts refused, the last is {b}", "The disk under the recorder is too slow; rows are missing in its files.";
     StaleRefused = 305, Warning, "stale_refused", "{a} parts older than allowed, the last is {b}",
         "Parts were too old to act on when they came; they are rejected.";
+    PartsRejected = 306, Warning, "parts_rejected", "{a} parts, reason {b}",
+        "A stage could not use parts: they were incomplete, malformed, or more than it holds. The ledger has them by reason.";
 
     // 4xx: time, overload, limits
     BudgetOverrun = 401, Warning, "budget_overrun", "busy for {a} µs of {b}", "A stage was busy with a sweep for longer than its budget.";
@@ -118,13 +120,13 @@ dictionary! {
     TableActive = 508, Info, "table_active", "parameters {a} are in use from sweep {b} on", "A stage uses its new parameters.";
 
     // 6xx: files
-    FileFailed = 601, Error, "file_failed", "", "A file could not be written and is closed; what it lacks is counted.";
-    FileRotated = 602, Info, "file_rotated", "", "The recording goes on in the next file.";
+    FileFailed = 601, Error, "file_failed", "{a} files could not be written, {b} by now", "A file could not be written and is closed; what it lacks is counted.";
+    FileRotated = 602, Info, "file_rotated", "file {a} of the recording is begun", "The recording goes on in the next file.";
     SharedMemoryGone = 603, Error, "shared_memory_gone", "", "Somebody deleted files of the chain in shared memory; the chain is restarted.";
 
     // 7xx: what the source sends
     SourceEnded = 701, Info, "source_ended", "after sweep {a}", "The recording, or what was asked for, has come to its end.";
-    ClockStep = 702, Warning, "clock_step", "by {a} ms (0: ahead, 1: back): {b}", "Sensor time went back, stood still or leapt ahead by more than 10 s; the sweeps go on.";
+    ClockStep = 702, Warning, "clock_step", "sensor time leapt {a} ms ahead, {b} ms back", "Sensor time went back or leapt ahead; the sweeps go on.";
 
     // 8xx: faults on purpose
     FaultInjected = 801, Info, "fault_injected", "fault {a} of the catalogue, by {b}", "Somebody put a fault into the chain with `encke inject`.";

@@ -4,6 +4,7 @@ use transport::{Outlet, Taken};
 
 use crate::deadline::Deadline;
 use crate::reader::{Arrivals, Reader, serve};
+use crate::refused::Refused;
 use crate::run_delay::Laps;
 use crate::shell::WARM_UP_PARTS;
 use crate::{Shell, ShellError, clock};
@@ -26,6 +27,7 @@ struct Cycle<'a, S: Stage> {
     outlet: Outlet<S::Output>,
     arrivals: Arrivals<'a>,
     deadline: Deadline,
+    refused: Refused,
     taken_by_others: Laps,
 }
 
@@ -33,14 +35,15 @@ impl<'a, S: Stage> Cycle<'a, S> {
     fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>) -> Self {
         let deadline = Deadline::of(&shell.plan, &shell.name);
         let taken_by_others = Laps::of_this_thread();
-        Self { stage, shell, outlet, arrivals: Arrivals::new(shell), deadline, taken_by_others }
+        let (arrivals, refused) = (Arrivals::new(shell), Refused::default());
+        Self { stage, shell, outlet, arrivals, deadline, refused, taken_by_others }
     }
 }
 
 impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
     /// One part: receive → in hand → process → send → published → counted → out of hand → release.
     fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
-        let Self { stage, shell, outlet, arrivals, deadline, taken_by_others } = self;
+        let Self { stage, shell, outlet, arrivals, deadline, refused, taken_by_others } = self;
         let page = &shell.page;
         let received_ns = clock::now_ns();
         let mut trace: Trace = *taken.trace();
@@ -79,13 +82,14 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             verdict,
             reserved: 0,
         };
-        deadline.judge(page, &shell.name, &trace, &hop);
+        deadline.judge(page, &trace, &hop);
         trace.push(hop);
         *loan.trace_mut() = trace;
         loan.send()?;
         page.count_sent(trace.part);
         page.count_verdict(verdict);
         page.put_down();
+        refused.note(page, &trace.part, verdict);
 
         arrivals.parts += 1;
         if arrivals.parts > WARM_UP_PARTS {

@@ -1,9 +1,9 @@
 //! Whether a stage keeps its times: overruns of its budget, slips, sweeps that left it after the deadline.
 
+use events::EventId;
 use messages::{Hop, Trace};
 
-use crate::page::Page;
-use crate::throttle::Throttle;
+use crate::page::{Page, Said};
 use crate::{Pace, Plan};
 
 const NS_PER_MS: f64 = 1e6;
@@ -17,7 +17,6 @@ pub(crate) struct Deadline {
     /// Sweep whose busy time is being added up.
     sweep: u64,
     busy_ns: u64,
-    overruns: Throttle,
 }
 
 impl Deadline {
@@ -32,7 +31,6 @@ impl Deadline {
             allowed_age_ns: ns(plan.chain.allowed_age_ms),
             sweep: 0,
             busy_ns: 0,
-            overruns: Throttle::new(),
         }
     }
 
@@ -41,8 +39,8 @@ impl Deadline {
         self.paced && now_ns.saturating_sub(trace.due_ns) > self.allowed_age_ns
     }
 
-    /// Judges a part that the stage `name` has finished, as its hop says; a sweep is judged with its last part.
-    pub(crate) fn judge(&mut self, page: &Page, name: &str, trace: &Trace, hop: &Hop) {
+    /// Judges a part that the stage has finished, as its hop says; a sweep is judged with its last part.
+    pub(crate) fn judge(&mut self, page: &Page, trace: &Trace, hop: &Hop) {
         let sent_ns = trace.hops().last().map_or(0, |sent| sent.finished_ns);
         if sent_ns < hop.free_ns {
             page.slips.add(1);
@@ -57,15 +55,10 @@ impl Deadline {
         if hop.finished_ns.saturating_sub(trace.due_ns) > self.deadline_ns {
             page.late.add(1);
         }
-        if self.busy_ns <= self.budget_ns {
-            self.overruns.heal();
-            return;
-        }
-        page.overruns.add(1);
-        if let Some(unsaid) = self.overruns.admit(self.busy_ns) {
-            let ms = |ns: u64| ns as f64 / NS_PER_MS;
-            let (sweep, busy_ms, budget_ms) = (trace.part.sweep, ms(self.busy_ns), ms(self.budget_ns));
-            tracing::warn!(stage = name, sweep, busy_ms, budget_ms, unsaid, "overran its budget");
+        if self.busy_ns > self.budget_ns {
+            page.overruns.add(1);
+            let (a, b) = (self.busy_ns / 1_000, self.budget_ns / 1_000);
+            page.say(Said { id: EventId::BudgetOverrun, time_ns: hop.finished_ns, sweep: trace.part.sweep, a, b });
         }
     }
 }
@@ -75,18 +68,10 @@ mod tests {
     use messages::Part;
 
     use super::*;
-    use crate::page::PageMap;
+    use crate::page::{Heard, PageMap};
 
     fn sut() -> Deadline {
-        Deadline {
-            paced: true,
-            budget_ns: 10,
-            deadline_ns: 50,
-            allowed_age_ns: 500,
-            sweep: 0,
-            busy_ns: 0,
-            overruns: Throttle::new(),
-        }
+        Deadline { paced: true, budget_ns: 10, deadline_ns: 50, allowed_age_ns: 500, sweep: 0, busy_ns: 0 }
     }
 
     fn trace(sweep: u64, sector: u32, due_ns: u64, sent_ns: u64) -> Trace {
@@ -105,12 +90,15 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let page = PageMap::create(&dir.path().join("page")).unwrap();
         let mut sut = sut();
-        sut.judge(&page, "sut", &trace(0, 0, 100, 100), &hop(0, 100, 106));
-        sut.judge(&page, "sut", &trace(0, 1, 110, 110), &hop(106, 110, 114));
+        sut.judge(&page, &trace(0, 0, 100, 100), &hop(0, 100, 106));
+        sut.judge(&page, &trace(0, 1, 110, 110), &hop(106, 110, 114));
         assert_eq!(page.overruns.get(), 0, "6 + 4 of 10");
-        sut.judge(&page, "sut", &trace(1, 0, 200, 200), &hop(114, 200, 206));
-        sut.judge(&page, "sut", &trace(1, 1, 210, 210), &hop(206, 210, 215));
+        sut.judge(&page, &trace(1, 0, 200, 200), &hop(114, 200, 206));
+        sut.judge(&page, &trace(1, 1, 210, 210), &hop(206, 210, 215));
         assert_eq!(page.overruns.get(), 1, "6 + 5 of 10");
+        let mut said = Vec::new();
+        page.hear(&mut Heard::default(), |event| said.push((event.id, event.sweep)));
+        assert_eq!(said, [(EventId::BudgetOverrun, 1)]);
     }
 
     #[test]
@@ -118,11 +106,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let page = PageMap::create(&dir.path().join("page")).unwrap();
         let mut sut = sut();
-        sut.judge(&page, "sut", &trace(0, 1, 100, 120), &hop(119, 121, 150));
+        sut.judge(&page, &trace(0, 1, 100, 120), &hop(119, 121, 150));
         assert_eq!((page.slips.get(), page.late.get()), (0, 0));
-        sut.judge(&page, "sut", &trace(1, 1, 100, 120), &hop(150, 150, 151));
+        sut.judge(&page, &trace(1, 1, 100, 120), &hop(150, 150, 151));
         assert_eq!((page.slips.get(), page.late.get()), (1, 1));
-        sut.judge(&page, "sut", &trace(2, 0, 100, 120), &hop(10, 120, 170));
+        sut.judge(&page, &trace(2, 0, 100, 120), &hop(10, 120, 170));
         assert_eq!(page.late.get(), 1, "only the last part of a sweep can be late");
     }
 

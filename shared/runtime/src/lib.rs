@@ -16,6 +16,7 @@ pub mod page;
 mod plan;
 mod reader;
 pub mod realtime;
+mod refused;
 mod run_delay;
 mod shell;
 mod shutdown;
@@ -23,7 +24,6 @@ mod sink;
 mod source;
 mod stand_in;
 mod tap;
-mod throttle;
 mod window;
 
 pub use cycle::run_stage;

@@ -92,6 +92,8 @@ pub struct Outputs {
     pub trace: Option<PathBuf>,
     /// Sweeps, detections and more, in MCAP.
     pub record: Option<PathBuf>,
+    /// What happens, one JSON line an event; the supervisor writes it.
+    pub events: Option<PathBuf>,
 }
 
 impl Plan {

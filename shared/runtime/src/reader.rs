@@ -1,3 +1,4 @@
+use events::EventId;
 use messages::{Message, Trace};
 use transport::{Inlet, Taken};
 
@@ -46,7 +47,8 @@ fn drain<T: Message>(shell: &Shell, inlet: &Inlet<T>, reader: &mut impl Reader<T
         let Some(taken) = inlet.take()? else {
             let lost = page.lose_below(lose_below);
             if lost > 0 {
-                tracing::error!(stage = shell.name, lost, "lost what was sent before this life was connected");
+                // It was sent before this life was connected.
+                shell.say(EventId::PartsLost, page.next_ordinal_in.get(), lost);
             }
             page.drained_incarnation.set(request);
             return Ok(());
@@ -79,7 +81,7 @@ impl<'a> Arrivals<'a> {
         let fresh = self.sender != Some(sent.incarnation);
         self.sender = Some(sent.incarnation);
         if let Some(gap) = page.take_in_hand(trace.part, sent.sequence, fresh) {
-            self.warn(gap);
+            self.tell(gap);
         }
         if page.swallow.take_one() {
             page.put_down();
@@ -88,14 +90,11 @@ impl<'a> Arrivals<'a> {
         true
     }
 
-    fn warn(&self, gap: Gap) {
-        let Gap { kind, first_ordinal, end_ordinal, parts } = gap;
-        let stage = self.shell.name.as_str();
-        match kind {
-            GapKind::Dropped => {
-                tracing::warn!(stage, parts, first_ordinal, end_ordinal, "dropped: the queue overflowed");
-            }
-            GapKind::Lost => tracing::error!(stage, parts, first_ordinal, end_ordinal, "lost with a process that died"),
-        }
+    fn tell(&self, gap: Gap) {
+        let id = match gap.kind {
+            GapKind::Dropped => EventId::PartsDropped,
+            GapKind::Lost => EventId::PartsLost,
+        };
+        self.shell.say(id, gap.end_ordinal, gap.parts);
     }
 }

@@ -1,12 +1,12 @@
 use std::fs::File;
 use std::time::Duration;
 
+use events::EventId;
 use messages::Part;
 use rustix::fs::{FlockOperation, flock};
 use transport::{Instance, Node};
 
-use crate::guardian::Guardian;
-use crate::page::{PageMap, State};
+use crate::page::{PageMap, Said, State};
 use crate::{Plan, ShellError, Shutdown, clock};
 
 /// How long a stage started by hand waits for its instance, and a successor for the settlement of its predecessor.
@@ -122,7 +122,13 @@ impl Shell {
         }
     }
 
-    /// Whether it is time to leave: asked to, or nobody has been left to ask for too long.
+    /// Says on the page what happened at part `ordinal`, `parts` of which are concerned.
+    pub(crate) fn say(&self, id: EventId, ordinal: u64, parts: u64) {
+        let sweep = ordinal / u64::from(self.plan.chain.sectors.max(1));
+        self.page.say(Said { id, time_ns: clock::now_ns(), sweep, a: parts, b: ordinal });
+    }
+
+    /// Whether it is time to leave: asked to, or nobody is left to ask.
     pub(crate) fn leaving(&self) -> bool {
         self.shutdown.asked() || self.guardian.abandoned()
     }

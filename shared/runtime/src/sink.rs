@@ -1,12 +1,14 @@
 use std::sync::Arc;
 
+use events::EventId;
 use messages::{Trace, Verdict};
 use stage::{Settled, Sink};
 use transport::Taken;
 
-use crate::deadline::Deadline;
+use crate::page::Said;
 use crate::reader::{Arrivals, Reader, serve};
-use crate::{Shell, ShellError, clock};
+use crate::refused::Refused;
+use crate::{Pace, Shell, ShellError, clock};
 
 /// Time between two checkpoints [ns].
 const CHECKPOINT_NS: u64 = 1_000_000_000;
@@ -24,10 +26,11 @@ pub fn run_sink<K: Sink>(
     let inlet = node.inlet::<K::Input>()?;
     shell.running();
     let checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
-    let deadline = Deadline::of(&shell.plan, &shell.name);
-    let mut end = End { sink, shell: &shell, arrivals: Arrivals::new(&shell), deadline, checkpoint_ns };
+    let (arrivals, refused) = (Arrivals::new(&shell), Refused::default());
+    let mut end = End { sink, shell: &shell, arrivals, refused, checkpoint_ns, failed_files: 0 };
     serve(&shell, &inlet, &mut end)?;
     let finished = end.sink.finish();
+    end.tell_failures();
     shell.left();
     Ok(finished?)
 }
@@ -36,19 +39,43 @@ struct End<'a, K: Sink> {
     sink: K,
     shell: &'a Shell,
     arrivals: Arrivals<'a>,
-    deadline: Deadline,
+    refused: Refused,
     checkpoint_ns: u64,
+    /// Files of which it was said that they failed.
+    failed_files: u64,
 }
 
 impl<K: Sink> End<'_, K> {
-    /// Notes when a sweep ended here, and how long after its last return it had left the last stage.
-    fn note(&self, trace: &Trace) {
+    /// Notes when a sweep ended here, and how long after its last return it had left the last stage; says so where that was
+    /// too long.
+    fn note(&mut self, trace: &Trace, verdict: Verdict) {
         let (page, now_ns) = (&self.shell.page, clock::now_ns());
         page.sent_ns.set(now_ns);
+        self.refused.note(page, &trace.part, verdict);
         if trace.part.is_last() {
             let sent_ns = trace.hops().last().map_or(now_ns, |hop| hop.finished_ns);
-            page.latency_ns.set(sent_ns.saturating_sub(trace.due_ns));
+            let latency_ns = sent_ns.saturating_sub(trace.due_ns);
+            page.latency_ns.set(latency_ns);
             page.answered_ns.set(now_ns);
+            let deadline_us = (self.shell.plan.chain.deadline_ms * 1e3) as u64;
+            if self.shell.plan.pace == Pace::Realtime && latency_ns > deadline_us * 1_000 {
+                let (a, b) = (latency_ns / 1_000, deadline_us);
+                page.say(Said { id: EventId::DeadlineMissed, time_ns: now_ns, sweep: trace.part.sweep, a, b });
+            }
+        }
+    }
+
+    /// Says that files cannot be written any more.
+    fn tell_failures(&mut self) {
+        let page = &self.shell.page;
+        let failed = self.sink.failed_files();
+        if failed > self.failed_files {
+            let (sweep, a) = (
+                page.next_ordinal_in.get() / u64::from(self.shell.plan.chain.sectors.max(1)),
+                failed - self.failed_files,
+            );
+            page.say(Said { id: EventId::FileFailed, time_ns: clock::now_ns(), sweep, a, b: failed });
+            self.failed_files = failed;
         }
     }
 }
@@ -70,7 +97,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
             self.shell.page.count_accepted(verdict);
             self.shell.page.wanted_attempt.set(self.sink.wanted_attempt().into());
             self.shell.page.put_down();
-            self.note(taken.trace());
+            self.note(taken.trace(), verdict);
         }
         Ok(())
     }
@@ -78,6 +105,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
     fn idle(&mut self) -> Result<(), ShellError> {
         if clock::now_ns() >= self.checkpoint_ns {
             self.checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
+            self.tell_failures();
             // A full disk costs statistics, not the chain.
             if let Err(error) = self.sink.checkpoint() {
                 tracing::error!(stage = self.shell.name, %error, "statistics could not be saved");

@@ -4,7 +4,7 @@ use stage::{Next, Source};
 use transport::{Loan, Outlet};
 
 use crate::kept::Kept;
-use crate::pacer::{Pacer, is_step};
+use crate::pacer::Pacer;
 use crate::page::{Said, State};
 use crate::run_delay::Laps;
 use crate::window::Window;
@@ -14,8 +14,8 @@ use crate::{Pace, Shell, ShellError, clock};
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
-/// Between two looks at the flags while it stands still [ns]: a twentieth of a turn at 10 Hz.
-const PAUSE_LOOK_NS: u64 = 5_000_000;
+/// Sensor time that leaps ahead by less is a gap in the recording [ns].
+const LEAP_NS: u64 = 5_000_000_000;
 /// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
 /// one that the sink has and has not yet written.
 const KEPT_BESIDE: usize = 2;
@@ -34,12 +34,15 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
     out.begin(&mut source)?;
     while !(shell.leaving() && out.is_between_sweeps()) {
         out.go_back_if_asked();
-        out.pause_if_asked(&mut source);
-        let next = if out.has_sweep() { Next::Sweep } else { out.make(&mut source)? };
-        match next {
-            Next::Sweep if !out.send()? => break,
-            Next::Sweep | Next::Nothing => {}
-            Next::End => out.wait_at_the_end(),
+        if !out.has_sweep() && !out.make(&mut source)? {
+            out.tell_end();
+            shell.page.set_state(State::Ended);
+            wait_while(shell, LOOK_NS, || !out.is_asked_back());
+            if !shell.leaving() {
+                shell.page.set_state(State::Running);
+            }
+        } else if !out.send()? {
+            break;
         }
     }
     shell.left();
@@ -69,6 +72,10 @@ struct Out<'a> {
     pacer: Pacer,
     cutter: Cutter,
     kept: Kept,
+    /// When the next sweep begins by the last one's header, sensor time [ns].
+    next_sensor_ns: Option<u64>,
+    /// It was said that the data end before this ordinal.
+    end_told: Option<u64>,
     /// Of the part to be sent next.
     ordinal: u64,
     trace: Trace,
@@ -93,6 +100,8 @@ impl<'a> Out<'a> {
             pacer: Pacer::at_rate(plan.source.rate),
             cutter: Cutter::new(plan.chain.sectors),
             kept: Kept::new(keep)?,
+            next_sensor_ns: None,
+            end_told: None,
             ordinal: 0,
             trace: Trace::default(),
             free_ns: clock::now_ns(),
@@ -140,9 +149,33 @@ impl<'a> Out<'a> {
         // The window is such that all that may be asked for is kept.
         let sweep = window.answered_sweeps().max(self.kept.first());
         let ordinal = (sweep * sectors).min(page.next_ordinal_out.get());
-        tracing::warn!(sweep = ordinal / sectors, attempt, "parts are missing: sending again from this sweep on");
         page.go_back(ordinal);
         page.attempt.set(attempt);
+        self.say(EventId::SentAgain, ordinal / sectors, attempt);
+    }
+
+    fn say(&self, id: EventId, a: u64, b: u64) {
+        let sweep = self.ordinal / self.sectors();
+        self.shell.page.say(Said { id, time_ns: clock::now_ns(), sweep, a, b });
+    }
+
+    /// Says once where the data end; whoever is asked back after that comes to the same end again.
+    fn tell_end(&mut self) {
+        if self.end_told.replace(self.ordinal) != Some(self.ordinal) {
+            self.say(EventId::SourceEnded, (self.ordinal / self.sectors()).saturating_sub(1), 0);
+        }
+    }
+
+    /// Says where sensor time does not go on as the last sweep had promised.
+    fn tell_clock(&mut self, header: &SweepHeader) {
+        let due_ns = self.next_sensor_ns.replace(header.sensor_time_ns.saturating_add(header.period_ns));
+        let Some(due_ns) = due_ns else { return };
+        let (ahead_ns, back_ns) =
+            (header.sensor_time_ns.saturating_sub(due_ns), due_ns.saturating_sub(header.sensor_time_ns));
+        // Key frames of a recording may lie far apart; a sensor's turns are never the same to the nanosecond.
+        if ahead_ns > LEAP_NS.max(10 * header.period_ns) || back_ns > header.period_ns {
+            self.say(EventId::ClockStep, ahead_ns / 1_000_000, back_ns / 1_000_000);
+        }
     }
 
     fn has_sweep(&self) -> bool {
@@ -228,7 +261,8 @@ impl<'a> Out<'a> {
         // For a life that begins within the sweep.
         made.step = self.shell.page.step.get() as u32;
         self.kept.keep();
-        Ok(Next::Sweep)
+        self.tell_clock(&header);
+        Ok(true)
     }
 
     /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep

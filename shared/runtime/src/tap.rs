@@ -1,8 +1,9 @@
+use events::EventId;
 use messages::{Clusters, Descriptors, Detections, Message, Order, Place, Sweep, Trace, Truth};
 use stage::Tap;
 use transport::Node;
 
-use crate::page::{Page, PageMap};
+use crate::page::{Page, PageMap, Said};
 use crate::{Pace, Plan, SOURCE, Shell, ShellError, clock, realtime};
 
 /// Between two looks into the queues where the source waits for what is found [ns].
@@ -26,7 +27,7 @@ pub fn run_tap<T: Tap>(mut tap: T, shell: &Shell) -> Result<(), ShellError> {
     }
     shell.running();
     let page = &shell.page;
-    let mut tick_ns = 0;
+    let (mut tick_ns, mut files) = (0, (1, 0));
     loop {
         topics.pause(shell);
         let leaving = shell.leaving();
@@ -41,11 +42,30 @@ pub fn run_tap<T: Tap>(mut tap: T, shell: &Shell) -> Result<(), ShellError> {
             tick_ns = clock::now_ns() + TICK_NS;
             tap.tick(clock::utc_ns());
             keep(&mut tap, shell);
+            tell_files(&mut tap, shell, &mut files);
         }
     }
     let finished = tap.finish(clock::utc_ns());
+    tell_files(&mut tap, shell, &mut files);
     shell.left();
     Ok(finished?)
+}
+
+/// Says which files were begun and which failed since it was told `before`.
+fn tell_files<T: Tap>(tap: &mut T, shell: &Shell, before: &mut (u64, u64)) {
+    let (begun, failed) = tap.files();
+    let sectors = u64::from(shell.plan.chain.sectors.max(1));
+    let say = |id, a| {
+        let sweep = shell.page.next_ordinal_out.get() / sectors;
+        shell.page.say(Said { id, time_ns: clock::now_ns(), sweep, a, b: failed });
+    };
+    if failed > before.1 {
+        say(EventId::FileFailed, failed - before.1);
+    }
+    if begun > before.0 {
+        say(EventId::FileRotated, begun);
+    }
+    *before = (begun.max(before.0), failed);
 }
 
 /// What was taken survives from here on, and whoever comes after this life begins behind it.
@@ -223,7 +243,7 @@ impl<M: Message> Topic<M> {
             self.next_sequence = Some(sequence + 1);
             if missed > 0 {
                 shell.page.dropped.add(missed);
-                tap.missed(M::TYPE, missed);
+                shell.say(EventId::PartsDropped, trace.part.ordinal, missed);
             }
             shell.page.received.add(1);
         }

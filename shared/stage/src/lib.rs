@@ -94,8 +94,10 @@ pub trait Tap {
     /// Takes what is known of a sweep.
     fn truth(&mut self, trace: &Trace, truth: &Truth, utc_ns: u64);
 
-    /// Parts of a message type never came: they overflowed the queue.
-    fn missed(&mut self, message: &'static str, parts: u64);
+    /// Files begun by now, and how many of them failed.
+    fn files(&mut self) -> (u64, u64) {
+        (0, 0)
+    }
 
     /// Called about once a second.
     fn tick(&mut self, utc_ns: u64);
@@ -126,6 +128,11 @@ pub trait Sink {
 
     /// The attempt ([`Part::attempt`]) that is needed because parts are missing, where parts are sent again; else 0.
     fn wanted_attempt(&self) -> u32 {
+        0
+    }
+
+    /// Files that could not be written and are closed.
+    fn failed_files(&self) -> u64 {
         0
     }
 

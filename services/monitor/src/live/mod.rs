@@ -10,18 +10,16 @@ mod tests;
 
 use std::io::{self, IsTerminal, Write};
 
+use events::{Event, Reader, Severity};
 use foxglove::messages::{Log, Timestamp, log};
 use prost::Message;
-use runtime::clock;
+use runtime::{Plan, clock};
 use tape::Topic;
 use transport::Instance;
 
 use crate::MonitorError;
 use crate::attached::Attached;
-use crate::events::Events;
 use crate::process::{be_idle, be_nice};
-use crate::sample::Sample;
-use crate::top::EventView;
 pub use account::{Account, TopicAccount};
 use feed::Feed;
 use server::Server;
@@ -88,7 +86,8 @@ struct Live<'a> {
     /// None while no chain of this name runs. The taps before what they are guests of.
     chain: Option<(Feed, Attached)>,
     server: Server,
-    last: Option<Sample>,
+    /// The log of the chain.
+    log: Reader,
     next_look_ns: u64,
     looks: u64,
     /// Of chains that have ended.
@@ -105,7 +104,7 @@ impl<'a> Live<'a> {
             instance,
             chain: Some(chain),
             server,
-            last: None,
+            log: log(instance),
             next_look_ns,
             looks: 0,
             unseen: (0, 0),
@@ -129,7 +128,7 @@ impl<'a> Live<'a> {
             if ended {
                 self.server.turn();
                 self.unseen = self.all_unseen();
-                (self.chain, self.last) = (None, None);
+                self.chain = None;
                 if !settings.wait {
                     return Ok(());
                 }
@@ -143,7 +142,7 @@ impl<'a> Live<'a> {
         self.next_look_ns = clock::now_ns() + LOOK_NS;
         self.looks += 1;
         match &self.chain {
-            Some((feed, chain)) => {
+            Some((feed, _)) => {
                 let now_ns = feed.sensor_time_ns;
                 if self.server.wants(Topic::Status)
                     && let Some(status) = supervisor.status()
@@ -153,21 +152,17 @@ impl<'a> Live<'a> {
                         true
                     });
                 }
-                let sample = Sample::take(chain);
-                if let Some(before) = &self.last {
-                    let mut events = Events::default();
-                    events.compare(&chain.facts, (0.0, 0), before, &sample);
-                    let told = events.views();
-                    if !told.is_empty() {
-                        self.server.offer(Topic::Events, now_ns, |out| encode_events(&told, now_ns, out));
-                    }
+                let mut told = Vec::new();
+                self.log.read(|event| told.push(event));
+                if !told.is_empty() {
+                    self.server.offer(Topic::Events, now_ns, |out| encode_events(&told, now_ns, out));
                 }
-                self.last = Some(sample);
             }
             None if supervisor.runs() => {
                 if let Ok(chain) = attach(self.instance) {
                     self.server.renew(&name(self.instance), &session(&chain.1));
                     self.chain = Some(chain);
+                    self.log = log(self.instance);
                 }
             }
             None => {}
@@ -217,14 +212,27 @@ fn session(chain: &Attached) -> String {
     format!("{}-{}", chain.facts.instance, chain.facts.supervisor_pid)
 }
 
-/// One `foxglove.Log` of all that happened since the last look.
-fn encode_events(events: &[EventView], sensor_time_ns: u64, out: &mut Vec<u8>) -> bool {
-    let lines: Vec<String> = events.iter().map(|event| format!("{} {}", event.stage, event.what)).collect();
-    let grave = events.iter().any(|event| event.grave);
+/// The log from now on.
+fn log(instance: &Instance) -> Reader {
+    let mut log = Reader::new(&Plan::events_path(instance), 0);
+    log.skip();
+    log
+}
+
+/// One `foxglove.Log` of all that happened since the last look, as grave as the gravest of it.
+fn encode_events(events: &[Event], sensor_time_ns: u64, out: &mut Vec<u8>) -> bool {
+    let lines: Vec<String> =
+        events.iter().map(|event| format!("{} {}: {}", event.stage, event.name, event.text)).collect();
+    let level = match events.iter().map(|event| event.severity).max() {
+        None | Some(Severity::Info) => log::Level::Info,
+        Some(Severity::Warning) => log::Level::Warning,
+        Some(Severity::Error) => log::Level::Error,
+        Some(Severity::Critical) => log::Level::Fatal,
+    };
     let seconds = u32::try_from(sensor_time_ns / 1_000_000_000).unwrap_or(u32::MAX);
     let log = Log {
         timestamp: Timestamp::new_checked(seconds, (sensor_time_ns % 1_000_000_000) as u32),
-        level: if grave { log::Level::Warning } else { log::Level::Info } as i32,
+        level: level as i32,
         message: lines.join("\n"),
         name: "encke".to_owned(),
         ..Log::default()

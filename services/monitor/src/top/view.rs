@@ -31,7 +31,7 @@ pub struct View {
     pub viewer: ProcessView,
     /// The latest sweep's obstacles.
     pub detections: DetectionsView,
-    /// What happened since this viewer is attached, oldest first.
+    /// What happened, oldest first: the latest of the log.
     pub events: Vec<EventView>,
     /// What this viewer saw pass and what it missed.
     pub tap: TapView,
@@ -159,13 +159,13 @@ pub struct DetectionRow {
 pub struct EventView {
     /// Since the supervisor started [s], the first time.
     pub at_s: f64,
-    /// Sweep at which it was seen first.
+    /// Sweep at which it happened first.
     pub sweep: u64,
     /// The stage, or `chain`.
     pub stage: String,
     /// What.
     pub what: String,
-    /// Whether data were lost by it.
+    /// Whether it is a warning or worse.
     pub grave: bool,
 }
 

@@ -1,5 +1,6 @@
+use events::Reader;
 use messages::Detections;
-use runtime::clock;
+use runtime::{Plan, clock};
 use transport::{Instance, Tap};
 
 use super::model::Model;
@@ -19,6 +20,8 @@ pub(super) struct Watch {
     interval_ns: u64,
     /// None while no chain of this name runs. The tap before what it is a guest of.
     chain: Option<(Tap<Detections>, Attached)>,
+    /// The log of the chain.
+    log: Reader,
     model: Model,
     next_sample_ns: u64,
     asked: bool,
@@ -31,8 +34,11 @@ impl Watch {
         let mut model = Model::new(chain.facts.clone());
         model.sample(Sample::take(&chain));
         let next_sample_ns = clock::now_ns() + interval_ns;
-        let instance = instance.clone();
-        Ok(Self { instance, interval_ns, chain: Some((tap, chain)), model, next_sample_ns, asked: false })
+        let (instance, log) = (instance.clone(), log(instance));
+        let mut watch =
+            Self { instance, interval_ns, chain: Some((tap, chain)), log, model, next_sample_ns, asked: false };
+        watch.read_log();
+        Ok(watch)
     }
 
     /// Whether this process was asked to leave.
@@ -60,6 +66,7 @@ impl Watch {
             return Ok(false);
         }
         self.model.sample(Sample::take(chain));
+        self.read_log();
         self.next_sample_ns = now_ns + self.interval_ns;
         if ended {
             self.chain = None;
@@ -76,7 +83,13 @@ impl Watch {
         self.model.renew(chain.facts.clone());
         self.model.sample(Sample::take(&chain));
         self.chain = Some((tap, chain));
+        self.log = log(&self.instance);
+        self.read_log();
         true
+    }
+
+    fn read_log(&mut self) {
+        self.log.read(|event| self.model.happened(&event));
     }
 
     /// What is to be shown now.
@@ -98,6 +111,11 @@ impl Watch {
         }
         Ok(self.view())
     }
+}
+
+/// The log from its begin on: what happened before this viewer came is shown, too.
+fn log(instance: &Instance) -> Reader {
+    Reader::new(&Plan::events_path(instance), 0)
 }
 
 fn attach(instance: &Instance) -> Result<(Tap<Detections>, Attached), MonitorError> {

@@ -128,7 +128,8 @@ impl Page {
 
     /// Parts of the stage before that stand in a category here.
     pub fn counted(&self) -> u64 {
-        self.processed.get() + self.rejected_total() + self.dropped.get() + self.lost.get()
+        let missing = self.dropped.get().saturating_add(self.lost.get());
+        self.processed.get().saturating_add(self.rejected_total()).saturating_add(missing)
     }
 
     /// Names and counts a gap that ends before `next_sequence`, so that a death on the way neither loses nor doubles it.
@@ -163,7 +164,7 @@ impl Page {
     }
 
     fn missing(&self) -> u64 {
-        self.dropped.get() + self.lost.get()
+        self.dropped.get().saturating_add(self.lost.get())
     }
 
     fn gap_words(&self, number: u64) -> &GapWords {

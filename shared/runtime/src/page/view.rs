@@ -76,7 +76,7 @@ pub struct Counts {
 impl Counts {
     /// Parts rejected for all reasons.
     pub fn rejected_total(&self) -> u64 {
-        self.rejected.iter().sum()
+        self.rejected.iter().fold(0, |sum, parts| sum.saturating_add(*parts))
     }
 }
 

@@ -95,9 +95,11 @@ impl Word {
         self.set(self.get().saturating_add(value));
     }
 
-    /// Adds to a value that other processes change too.
+    /// Adds to a value that other processes change too; saturates, never wraps.
     pub fn give(&self, value: u64) {
-        self.0.fetch_add(value, Ordering::AcqRel);
+        let add = |before: u64| Some(before.saturating_add(value));
+        // Never refuses.
+        let _ = self.0.fetch_update(Ordering::AcqRel, Ordering::Acquire, add);
     }
 
     /// Takes one from a value that is not 0 and that other processes change too.
@@ -285,12 +287,44 @@ impl Page {
 
     /// Parts rejected for all reasons.
     pub fn rejected_total(&self) -> u64 {
-        self.rejected.iter().map(Word::get).sum()
+        self.rejected.iter().map(Word::get).fold(0, u64::saturating_add)
     }
 
     /// Parts rejected, by reason, where there are any.
     pub fn rejected_by_reason(&self) -> impl Iterator<Item = (Verdict, u64)> + '_ {
         let reasons = Verdict::ALL.into_iter().filter(|verdict| verdict.is_rejected());
         reasons.map(|verdict| (verdict, self.rejected[verdict as usize].get())).filter(|(_, parts)| *parts > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::page::PageMap;
+
+    #[test]
+    fn a_word_that_is_full_stays_full() {
+        let word = Word::default();
+        word.set(u64::MAX - 1);
+        word.add(5);
+        assert_eq!(word.get(), u64::MAX);
+        word.give(1);
+        assert_eq!(word.get(), u64::MAX);
+        assert!(word.take_one());
+        word.give(u64::MAX);
+        assert_eq!(word.get(), u64::MAX);
+    }
+
+    #[test]
+    fn sums_of_full_words_are_full() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("page");
+        let page = PageMap::create(&path).unwrap();
+        page.rejected.iter().for_each(|word| word.set(u64::MAX));
+        page.processed.set(u64::MAX);
+        page.dropped.set(7);
+        page.lost.set(u64::MAX);
+        assert_eq!((page.rejected_total(), page.counted()), (u64::MAX, u64::MAX));
+        assert_eq!(crate::page::PageView::open(&path).unwrap().counts().rejected_total(), u64::MAX);
     }
 }

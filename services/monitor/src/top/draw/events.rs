@@ -15,7 +15,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
     let room = usize::from(inner.height);
     let end = view.events.len() - ui.events_back.min(view.events.len().saturating_sub(room));
     let lines: Vec<Line<'_>> = if view.events.is_empty() {
-        vec![Line::styled("none since this view is attached", theme::faint())]
+        vec![Line::styled("none", theme::faint())]
     } else {
         view.events[end.saturating_sub(room)..end].iter().map(line).collect()
     };

@@ -30,8 +30,8 @@ pub(crate) struct Model {
     /// Looks of the last [`RATE_NS`] and the one before, the latest last.
     marks: VecDeque<Mark>,
     uptime_s: Option<f64>,
-    /// The uptime, or the last that was known.
-    event_s: f64,
+    /// When the supervisor started, as far as it was seen, by the clock of host time [s].
+    started_s: f64,
     notice: Option<String>,
 }
 
@@ -51,7 +51,7 @@ impl Model {
             events: Events::default(),
             marks: VecDeque::new(),
             uptime_s: None,
-            event_s: 0.0,
+            started_s: 0.0,
             notice: None,
         }
     }
@@ -73,14 +73,7 @@ impl Model {
     pub(crate) fn sample(&mut self, sample: Sample) {
         let at_s = sample.at_ns as f64 / 1e9;
         self.uptime_s = sample.supervisor.map(|supervisor| at_s - supervisor.started_s);
-        self.event_s = self.uptime_s.unwrap_or(self.event_s);
-        let now = (self.event_s, sent_sweeps(&self.facts, &sample));
-        if let Some(before) = self.marks.back() {
-            self.events.compare(&self.facts, now, &before.sample, &sample);
-        }
-        for (sweep, latency_ns) in self.sweeps.take_misses() {
-            self.events.add_miss((now.0, sweep), &self.facts, latency_ns);
-        }
+        self.started_s = sample.supervisor.map_or(self.started_s, |supervisor| supervisor.started_s);
         let busy_ns = self.sweeps.busy_ns().to_vec();
         let parts = self.sweeps.tap().parts;
         let from_ns = sample.at_ns.saturating_sub(RATE_NS);
@@ -88,6 +81,11 @@ impl Model {
         while self.marks.get(1).is_some_and(|mark| mark.sample.at_ns <= from_ns) {
             self.marks.pop_front();
         }
+    }
+
+    /// Adds an event of the log, after the first look.
+    pub(crate) fn happened(&mut self, event: &events::Event) {
+        self.events.add((event.time_ns as f64 / 1e9 - self.started_s).max(0.0), event);
     }
 
     /// Says why there is nothing new, or that there is again.

@@ -43,8 +43,6 @@ pub(super) struct Sweeps {
     last_sweep: Option<u64>,
     recent: VecDeque<Ended>,
     missed: u64,
-    /// Late and unanswered sweeps that nobody has been told of.
-    untold: Vec<Ended>,
     busy_ns: [u64; MAX_HOPS],
 }
 
@@ -58,7 +56,6 @@ impl Sweeps {
             last_sweep: None,
             recent: VecDeque::with_capacity(HISTORY + 1),
             missed: 0,
-            untold: Vec::new(),
             busy_ns: [0; MAX_HOPS],
         }
     }
@@ -134,7 +131,6 @@ impl Sweeps {
     fn push(&mut self, ended: Ended) {
         if self.is_miss(&ended) {
             self.missed += 1;
-            self.untold.push(ended);
         }
         self.recent.push_back(ended);
         if self.recent.len() > HISTORY {
@@ -148,11 +144,6 @@ impl Sweeps {
 
     fn window(&self) -> impl Iterator<Item = &Ended> {
         self.recent.iter().skip(self.recent.len().saturating_sub(WINDOW))
-    }
-
-    /// Misses since the last call: the sweep, and how long it took where it was answered.
-    pub(super) fn take_misses(&mut self) -> impl Iterator<Item = (u64, Option<u64>)> + use<> {
-        std::mem::take(&mut self.untold).into_iter().map(|ended| (ended.sweep, ended.latency_ns))
     }
 
     /// Work of each stage on all parts seen so far.

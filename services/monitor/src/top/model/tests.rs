@@ -1,3 +1,4 @@
+use events::EventId;
 use messages::{ClusterSummary, Detection, Hop, Part, Verdict};
 use runtime::page::Counts;
 use zerocopy::FromZeros;
@@ -171,52 +172,50 @@ fn a_queue_is_what_was_published_and_not_yet_expected() {
     assert_eq!(queues, [None, Some(3), Some(0)]);
 }
 
+fn event(id: EventId, stage: &str, at_ms: u64, text: &str) -> events::Event {
+    let (time_ns, stage, text) = (at_ms * MS, stage.to_owned(), text.to_owned());
+    let (name, severity) = (id.entry().name.to_owned(), id.severity());
+    events::Event { number: 0, time_ns, utc_ns: 0, id: id as u32, name, severity, stage, sweep: 7, text, unsaid: 0 }
+}
+
 #[test]
-fn a_death_a_restart_and_what_was_lost_are_events() {
+fn a_dead_stage_is_seen_and_the_log_says_what_happened() {
     let mut sut = sut();
     sut.sample(look(1_000, running()));
     let mut counts = running();
     counts[1].settled_incarnation = 1;
     sut.sample(look(2_000, counts));
     assert_eq!(sut.view().stages[1].state, "died");
-    counts[1] = Counts { incarnation: 2, pid: 11, lost: 1, ..counts[1] };
-    sut.sample(look(3_000, counts));
-    assert_eq!(sut.view().stages[1].state, "running");
-    assert_eq!(
-        what(&sut),
-        [
-            "clusterer process 10 is gone",
-            "clusterer restarted: life 2, process 11",
-            "clusterer lost with a process: 1 part"
-        ]
-    );
+    sut.happened(&event(EventId::StageDied, "clusterer", 1_950, "process 10: signal 9"));
+    sut.happened(&event(EventId::RunEnds, "chain", 1_960, ""));
+    assert_eq!(what(&sut), ["clusterer stage died: process 10: signal 9", "chain run ends"]);
+    let view = &sut.view().events[0];
+    assert_eq!((view.at_s, view.sweep, view.grave), (0.95, 7, true), "the supervisor started at 1 s");
 }
 
 #[test]
 fn what_happens_again_soon_is_one_event_with_a_larger_number() {
     let mut sut = sut();
-    let mut counts = running();
-    for at_s in 1..=4 {
-        counts[1].overruns = at_s;
-        counts[2].dropped = 10 * at_s;
-        sut.sample(look(at_s * 1_000, counts));
+    for place in 0..3 {
+        sut.happened(&event(EventId::BudgetOverrun, "clusterer", 1_000 + place, &format!("no. {place}")));
     }
-    assert_eq!(what(&sut), ["clusterer over its budget: 3 times", "recorder dropped, queue full: 30 parts"]);
-    counts[1].overruns += 1;
-    sut.sample(look(60_000, counts));
-    assert_eq!(what(&sut)[2], "clusterer over its budget: once");
+    sut.happened(&events::Event { unsaid: 9, ..event(EventId::PartsDropped, "recorder", 1_500, "3 parts") });
+    assert_eq!(what(&sut), ["clusterer budget overrun: no. 2 (3 times)", "recorder parts dropped: 3 parts (10 times)"]);
+    sut.happened(&event(EventId::BudgetOverrun, "clusterer", 60_000, "later"));
+    sut.happened(&event(EventId::BudgetOverrun, "extractor", 60_000, "another"));
+    // Deaths are told one by one.
+    sut.happened(&event(EventId::StageDied, "clusterer", 60_001, "a"));
+    sut.happened(&event(EventId::StageDied, "clusterer", 60_002, "b"));
+    assert_eq!(what(&sut)[2..].len(), 4);
 }
 
 #[test]
-fn steps_and_misses_are_events_of_the_chain() {
+fn the_step_in_force_is_the_sources() {
     let mut sut = sut();
-    sut.sample(look(1_000, running()));
-    sweep(&mut sut, 0, 140);
     let mut counts = running();
     counts[0].step = 3;
     sut.sample(look(2_000, counts));
     assert_eq!(sut.view().step, "clusters-only");
-    assert_eq!(what(&sut), ["chain step nominal → clusters-only", "chain deadline missed: 140.0 ms of 100"]);
 }
 
 #[test]
