@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-pub(crate) use look::{EventsArgs, LiveArgs, ReportArgs, SeverityArg, TopArgs, ViewArgs};
+pub(crate) use look::{EventsArgs, LiveArgs, MetricsArgs, ReportArgs, SeverityArg, TopArgs, ViewArgs};
 use notes::*;
 pub(crate) use operate::{CtlArgs, Fault, InjectArgs, Request};
 use runtime::Pace;
@@ -74,6 +74,9 @@ pub(crate) enum Command {
     /// Show a running chain in the terminal.
     #[command(after_help = TOP_NOTES)]
     Top(TopArgs),
+    /// Serve a running chain's counters to Prometheus, over HTTP.
+    #[command(after_help = METRICS_NOTES)]
+    Metrics(MetricsArgs),
     /// Serve a running chain to Foxglove, over a WebSocket.
     #[command(after_help = LIVE_NOTES)]
     Live(LiveArgs),

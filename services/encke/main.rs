@@ -14,6 +14,7 @@ mod events;
 mod inject;
 mod instances;
 mod live;
+mod metrics;
 mod outputs;
 mod report;
 mod run;
@@ -88,6 +89,7 @@ fn main() -> ExitCode {
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Report(args) => report::report(&args),
         Command::Top(args) => top::top(&args),
+        Command::Metrics(args) => metrics::metrics(&args),
         Command::Live(args) => live::live(&args),
         Command::View(args) => view::view(&args),
     };

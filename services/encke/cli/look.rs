@@ -50,6 +50,20 @@ pub(crate) enum SeverityArg {
     Critical,
 }
 
+/// Options of `encke metrics`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct MetricsArgs {
+    /// Address and port to listen on; port 0 is any that is free.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:9464")]
+    pub(crate) listen: std::net::SocketAddr,
+    /// The chain. [default: the only one that runs]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instance: Option<String>,
+    /// Allow an address that others than this machine can reach; they see the chain, without password and encryption.
+    #[arg(long)]
+    pub(crate) anywhere: bool,
+}
+
 /// Options of `encke top`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct TopArgs {

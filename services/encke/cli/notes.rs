@@ -114,6 +114,14 @@ Examples:
   encke top --instance flight-1 --interval 250ms
   encke top --once --json";
 
+pub(super) const METRICS_NOTES: &str = "\
+Looks only: the chain neither waits for it nor knows of it. GET /metrics gives counters and states as Prometheus' text. While no
+chain of this name runs, `encke_up` is 0; Ctrl-C ends it. Standard output has the address.
+
+Examples:
+  encke metrics                                then http://127.0.0.1:9464/metrics
+  encke metrics --listen 127.0.0.1:0 --instance flight-1";
+
 pub(super) const LIVE_NOTES: &str = "\
 Topics: /encke/sweep, /encke/clusters, /encke/detections, /encke/events, /encke/status. It runs behind everything else on
 the machine; what a slow viewer cannot take is not sent, and counted. Standard output has the address, and at the end where

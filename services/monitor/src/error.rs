@@ -16,6 +16,14 @@ pub enum MonitorError {
         /// What the system said.
         cause: std::io::Error,
     },
+    /// The same for Prometheus.
+    #[error("{address}: {cause}; choose another with --listen")]
+    Metrics {
+        /// Address and port as asked for.
+        address: String,
+        /// What the system said.
+        cause: std::io::Error,
+    },
     /// There is no memory to join sweeps in.
     #[error("no memory for a sweep; free some")]
     Memory,
