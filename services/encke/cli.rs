@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use look::{EventsArgs, LiveArgs, MetricsArgs, ReportArgs, SeverityArg, TopArgs, ViewArgs};
 use notes::*;
-pub(crate) use operate::{CtlArgs, Fault, InjectArgs, Request};
+pub(crate) use operate::{CtlArgs, InjectArgs, Request};
 use runtime::Pace;
 pub(crate) use soak::SoakArgs;
 
@@ -224,7 +224,7 @@ fn parse_rate(text: &str) -> Result<f64, String> {
     if (0.1..=10.0).contains(&rate) { Ok(rate) } else { Err("must be 0.1 to 10".to_owned()) }
 }
 
-fn parse_duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     humantime::parse_duration(text).map_err(|cause| format!("{cause}; write 500ms, 30s, 5m or 2h"))
 }
 

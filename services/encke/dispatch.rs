@@ -15,6 +15,7 @@ use transport::Instance;
 use crate::assets::Assets;
 use crate::cli::StageArgs;
 use crate::sources::{self, Opened};
+use crate::spoiling::spoiled;
 use crate::taping::{self, Taping};
 use crate::{Failure, heap_allocations};
 
@@ -36,9 +37,11 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
     let enter = |plan: Plan| Shell::enter(instance, plan, &args.name, heap_allocations);
     let outcome = match args.name.as_str() {
         SOURCE => match sources::open(&plan.source, &assets)? {
-            Opened::Scene(simulator) => enter(plan).and_then(|shell| run_source(*simulator, &shell)),
-            Opened::Recording(recording) => enter(plan).and_then(|shell| run_source(*recording, &shell)),
-            Opened::Live(live) => enter(plan).and_then(|shell| run_source(*live, &shell)),
+            Opened::Scene(simulator) => enter(plan).and_then(|shell| run_source(spoiled(*simulator, &shell), &shell)),
+            Opened::Recording(recording) => {
+                enter(plan).and_then(|shell| run_source(spoiled(*recording, &shell), &shell))
+            }
+            Opened::Live(live) => enter(plan).and_then(|shell| run_source(spoiled(*live, &shell), &shell)),
         },
         Clusterer::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Clusterer>(&shell)),
         Extractor::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Extractor>(&shell)),

@@ -21,6 +21,7 @@ mod run;
 mod simulate;
 mod soak;
 mod sources;
+mod spoiling;
 mod taping;
 mod top;
 mod train;
@@ -75,6 +76,7 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 
 fn main() -> ExitCode {
     runtime::logging::abort_on_panic();
+    runtime::ignore_file_limit();
     let outcome = match Cli::parse().chosen() {
         Command::Run(args) => run::run(&args),
         Command::Stage(args) => dispatch::stage(&args),

@@ -2,36 +2,48 @@
 
 use std::time::Duration;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use faults::{CATALOGUE, Entry, Fault};
 
 use super::{EventsArgs, parse_duration};
-
-/// A fault that can be put into a running chain.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Fault {
-    Kill,
-    Stop,
-    Slow,
-    Swallow,
-}
 
 /// Options of `encke inject`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct InjectArgs {
     /// The fault.
-    #[arg(value_enum)]
+    #[arg(value_parser = faults())]
     pub(crate) fault: Fault,
-    /// The stage.
-    pub(crate) stage: String,
-    /// stop: for how long.
-    #[arg(long = "for", value_name = "TIME", default_value = "500ms", value_parser = parse_duration)]
-    pub(crate) length: Duration,
-    /// slow: by how much each sweep.
-    #[arg(long, value_name = "TIME", default_value = "20ms", value_parser = parse_duration)]
-    pub(crate) by: Duration,
+    /// The stage, where the fault hits one.
+    pub(crate) stage: Option<String>,
+    /// How strong: a level, a factor, workers, bytes, lines a second; slow and clock-step: a time.
+    #[arg(long, value_name = "STRENGTH", visible_aliases = ["level", "workers"], allow_hyphen_values = true)]
+    pub(crate) by: Option<String>,
+    /// For how long, where it lasts.
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    pub(crate) length: Option<Duration>,
+    /// How often, or for how many sweeps.
+    #[arg(long, value_name = "N")]
+    pub(crate) times: Option<u64>,
+    /// Of all that is random in it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u32,
     /// The chain. [default: the only one that runs]
     #[arg(long, value_name = "NAME")]
     pub(crate) instance: Option<String>,
+    /// Print when it was put in, and what, as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// This process is one worker of a hog.
+    #[arg(long, hide = true)]
+    pub(crate) as_worker: bool,
+}
+
+/// The words of the catalogue, with a line of help each.
+fn faults() -> impl TypedValueParser<Value = Fault> {
+    let word = |entry: &Entry| PossibleValue::new(entry.name).help(entry.help);
+    PossibleValuesParser::new(CATALOGUE.iter().map(word))
+        .try_map(|name| Fault::from_name(&name).ok_or_else(|| format!("no fault {name:?}")))
 }
 
 /// What to ask of a running chain.

@@ -16,6 +16,7 @@ mod campaign;
 mod catalogue;
 mod corrupt;
 mod corrupted;
+mod damage;
 mod planned;
 mod schedule;
 
@@ -23,5 +24,6 @@ pub use campaign::{Campaign, CampaignError, CampaignFile, Spacing};
 pub use catalogue::{CATALOGUE, Entry, FOR_EVER, Fault, Lasting, Strength, Target, Unit};
 pub use corrupt::Corruptor;
 pub use corrupted::{Corrupted, Held};
+pub use damage::{damage, damaged_text, shuffled};
 pub use planned::{PlanError, Planned};
 pub use schedule::schedule;

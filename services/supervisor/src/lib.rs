@@ -30,6 +30,7 @@ mod restarts;
 mod scheduling;
 mod services;
 mod settle;
+mod shared_memory;
 mod status;
 mod steering;
 mod summary;

@@ -29,7 +29,7 @@ use crate::progress::Progress;
 use crate::report::Report;
 use crate::services::Services;
 use crate::settle::settle;
-use crate::telling::{Ears, open_log};
+use crate::shared_memory::SharedMemory;
 use crate::timeline::Timeline;
 
 /// Between two looks at the pages.
@@ -117,6 +117,7 @@ pub(crate) struct Watch<'a> {
     pub(crate) started_ns: u64,
     pub(crate) next_sample_ns: u64,
     pub(crate) usage: Usage,
+    pub(crate) shared_memory: SharedMemory,
     pub(crate) machine: Machine,
     pub(crate) noise: Noise,
     pub(crate) timeline: Timeline,
@@ -182,7 +183,8 @@ impl<'a> Watch<'a> {
             started_ns,
             next_sample_ns: now_ns + SAMPLE_NS,
             usage: Usage::default(),
-            progress: Progress::new(started_ns, plan),
+            shared_memory: SharedMemory::default(),
+            progress: Progress::new(now_ns, plan),
             ladder: Ladder::new(plan.chain.overload.clone()),
             ladder_stood: Step::Nominal,
             overload: OverloadReport::default(),

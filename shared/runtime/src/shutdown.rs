@@ -1,8 +1,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rustix::process::{Pid, test_kill_process};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use rustix::process::{Pid, getppid, test_kill_process};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 
 use crate::ShellError;
 
@@ -31,4 +31,11 @@ impl Shutdown {
     pub fn orphaned(&self) -> bool {
         self.supervisor.is_none_or(|supervisor| test_kill_process(supervisor).is_err())
     }
+}
+
+/// A file that has grown to the process's limit is an error of that write, as on a full disk. By default the kernel ends the
+/// process instead (SIGXFSZ), and a limit on a recorder would take the chain's end with it.
+pub fn ignore_file_limit() {
+    // Nobody reads the flag: the signal is taken so that it does nothing. Refused nowhere; then all is as by default.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }
