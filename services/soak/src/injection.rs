@@ -1,3 +1,4 @@
+use faults::{Fault, Lasting, Planned};
 use serde::{Deserialize, Serialize};
 
 /// A fault to come: when, and what `encke inject` is told.
@@ -18,6 +19,26 @@ pub struct Injection {
 }
 
 impl Injection {
+    /// Of a campaign of `length_s` in which sweeps are `period_s` apart.
+    pub(crate) fn of(planned: &Planned, length_s: f64, period_s: f64) -> Self {
+        let rest_s = (length_s - planned.at_s).max(0.0);
+        let lasts_s = match (planned.for_s, planned.times, planned.fault.entry().lasting) {
+            (Some(for_s), ..) => for_s,
+            (None, Some(times), _) if is_of_sweeps(planned.fault) => times as f64 * period_s,
+            (None, Some(times), _) if times == faults::FOR_EVER => rest_s,
+            (None, None, Lasting::Open) => rest_s,
+            _ => 0.0,
+        };
+        Self {
+            at_s: planned.at_s,
+            fault: planned.fault.name().to_owned(),
+            stage: planned.stage.clone(),
+            words: planned.command_line(),
+            lasts_s: lasts_s.min(rest_s),
+            again_ms: None,
+        }
+    }
+
     /// Whether the supervisor is to die of it, too.
     pub fn ends_supervisor(&self) -> bool {
         ["kill-supervisor", "kill-all"].contains(&self.fault.as_str())
@@ -32,5 +53,38 @@ impl Injection {
     pub fn title(&self) -> String {
         let again = if self.again_ms.is_some() { ", again at start-up" } else { "" };
         format!("{}{again}", self.fault)
+    }
+}
+
+/// Whether a fault is had sweep by sweep.
+fn is_of_sweeps(fault: Fault) -> bool {
+    (100..200).contains(&(fault as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_lasts_as_long_as_its_sweeps_or_its_time_or_to_the_end() {
+        let lasts_s = |fault, stage: Option<&str>| {
+            let planned = Planned::usual(fault, 10.0, stage.map(str::to_owned), 1);
+            Injection::of(&planned, 60.0, 0.1).lasts_s
+        };
+        assert_eq!(lasts_s(Fault::Kill, Some("source")), 0.0);
+        assert_eq!(lasts_s(Fault::Stop, Some("source")), 0.5);
+        assert_eq!(lasts_s(Fault::Dust, None), 1.0);
+        assert_eq!(lasts_s(Fault::CrashLoop, Some("extractor")), 50.0);
+        let planned = Planned { for_s: None, ..Planned::usual(Fault::Slow, 10.0, Some("source".to_owned()), 1) };
+        assert_eq!(Injection::of(&planned, 60.0, 0.1).lasts_s, 50.0);
+    }
+
+    #[test]
+    fn who_is_hit_may_lose_its_process() {
+        let of = |fault, stage: Option<&str>| {
+            Injection::of(&Planned::usual(fault, 0.0, stage.map(str::to_owned), 1), 60.0, 0.1)
+        };
+        assert!(!of(Fault::Kill, Some("source")).hits_neighbours());
+        assert!(of(Fault::KillAll, None).hits_neighbours() && of(Fault::KillSupervisor, None).ends_supervisor());
     }
 }

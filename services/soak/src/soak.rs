@@ -61,7 +61,7 @@ pub fn soak(settings: &Settings) -> Result<Verdict, SoakError> {
             let cycles = campaign::kill_all(file, &settings.setup, settings.seed, &*interrupts()?, say)?;
             starts(base, settings.bars.kill_all, file.times, cycles, clock::now_ns() - began_ns)
         }
-        Campaign::Nothing | Campaign::Faults(_) | Campaign::Kills(_) => faults(base, settings)?,
+        Campaign::Nothing | Campaign::Faults(_) | Campaign::Kills(_) => watch(base, settings)?,
         Campaign::ModeChanges(file) => {
             let length_s = file.times as f64 * (file.pause_ms / 2e3 + 0.1);
             let mut session = Session::begin(&settings.setup, settings.more.clone(), length_s, interrupts()?)?;
@@ -101,14 +101,18 @@ struct Ended {
     early: Option<String>,
 }
 
-fn faults(base: Verdict, settings: &Settings) -> Result<Verdict, SoakError> {
+fn watch(base: Verdict, settings: &Settings) -> Result<Verdict, SoakError> {
     let expected_s = settings.length_s.unwrap_or(match &settings.campaign {
         Campaign::Kills(file) => file.times as f64 * 5.0 * file.spacing_s,
         _ => 60.0,
     });
     let mut session = Session::begin(&settings.setup, settings.more.clone(), expected_s, interrupts()?)?;
     let list = match &settings.campaign {
-        Campaign::Faults(list) => list.clone(),
+        Campaign::Faults(campaign) => {
+            let period_s = session.observer.availability.period_ns() as f64 / 1e9;
+            let all = faults::schedule(campaign, settings.seed, expected_s);
+            all.iter().map(|planned| Injection::of(planned, expected_s, period_s)).collect()
+        }
         Campaign::Kills(file) => {
             let all = || session.observer.plan.stages().map(str::to_owned).collect();
             let stages: Vec<String> = file.stages.clone().unwrap_or_else(all);

@@ -1,6 +1,6 @@
 use serde::Deserialize;
 
-use crate::{Injection, SoakError};
+use crate::SoakError;
 
 /// What is done to the chain.
 #[derive(Clone, Debug, Default)]
@@ -8,8 +8,8 @@ pub enum Campaign {
     /// Nothing.
     #[default]
     Nothing,
-    /// Faults by a list.
-    Faults(Vec<Injection>),
+    /// Faults by a script, or drawn.
+    Faults(faults::Campaign),
     /// Each stage killed, again and again.
     Kills(KillsFile),
     /// All processes killed in any order, and a new start.
@@ -129,17 +129,16 @@ enum Kinds {
 }
 
 impl Campaign {
-    /// Whether a text is of a kind that this room conducts: it says so by `kind`.
-    pub fn is_one(text: &str) -> bool {
-        text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind"))
-    }
-
     /// Reads a campaign.
     ///
     /// # Errors
     /// It is no TOML, lacks a key, has one too many, or one out of its bounds.
     pub fn parse(file: &str, text: &str) -> Result<Self, SoakError> {
         let refused = |cause: String| SoakError::Table { file: file.to_owned(), cause };
+        // A list of faults has no kind.
+        if !text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind")) {
+            return faults::Campaign::parse(text).map(Self::Faults).map_err(|cause| refused(cause.to_string()));
+        }
         let kinds: Kinds = toml::from_str(text).map_err(|cause| refused(cause.to_string().trim_end().to_owned()))?;
         let within = |key: &str, value: f64, least: f64, most: f64| {
             let holds = (least..=most).contains(&value);
@@ -199,5 +198,38 @@ impl Campaign {
     /// Whether it has a length of its own.
     pub fn has_length(&self) -> bool {
         !matches!(self, Self::Nothing | Self::Faults(_))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHIPPED: [(&str, &str, &str); 3] = [
+        ("kills", "kills", include_str!("../../../../config/faults/kills.toml")),
+        ("kill-all", "kill-all", include_str!("../../../../config/faults/kill-all.toml")),
+        ("cycles", "cycles", include_str!("../../../../config/faults/cycles.toml")),
+    ];
+
+    #[test]
+    fn the_shipped_campaigns_hold() {
+        for (file, kind, text) in SHIPPED {
+            let campaign = Campaign::parse(file, text).unwrap();
+            assert_eq!((campaign.kind(), campaign.has_length()), (kind, true));
+        }
+        let list = "[[script]]\nat_s = 2.0\nfault = \"kill\"\nstage = \"extractor\"";
+        let campaign = Campaign::parse("list", list).unwrap();
+        assert_eq!((campaign.kind(), campaign.has_length()), ("faults", false));
+    }
+
+    #[test]
+    fn what_does_not_hold_is_refused_by_name() {
+        let refused = |text: &str| Campaign::parse("c.toml", text).unwrap_err().to_string();
+        let cycles = "kind = \"cycles\"\ntimes = 0\nrun_ms = 1.0";
+        assert_eq!(refused(cycles), "c.toml: times is 0, must be 1 to 1000000");
+        assert!(refused("kind = \"parties\"\ntimes = 1").contains("parties"));
+        assert!(refused(&(cycles.to_owned() + "\nmore = 1")).contains("more"));
+        let step = "kind = \"day\"\n[[step]]\nname = \"both\"\nshutdown = true\nreplay = true";
+        assert_eq!(refused(step), "c.toml: things done in step 0 (both) is 2, must be 1 to 1");
     }
 }
