@@ -86,28 +86,126 @@ fn a_stopped_stage_is_charged_with_every_sweep_that_it_held_up() {
     assert!(worst["cause"].as_str().unwrap().starts_with("clusterer"), "{worst}");
 }
 
+/// Kills a stage whenever it runs, until it is built so or the run has ended; how often.
+fn crash_loop(run: &Run, child: &mut Child, stage: usize, until: &str) -> u64 {
+    for kills in 0..50 {
+        let mut there = false;
+        run.wait_for_or_end(child, |status| {
+            let stage = &status["stages"][stage];
+            stage["restarts"].as_u64() == Some(kills) && stage["state"] == "running"
+        });
+        if let Some(status) = run.status() {
+            there = status["stages"][stage]["tier"] == until;
+        }
+        if there || child.try_wait().unwrap().is_some() {
+            return kills;
+        }
+        let kill = ["inject", "kill", STAGES[stage], "--instance", &run.instance];
+        let _ = support::encke().args(kill).output().unwrap();
+    }
+    panic!("an endless restart loop");
+}
+
 #[test]
-fn a_stage_that_keeps_dying_ends_the_run() {
+fn a_stage_that_keeps_dying_is_stood_in_for_in_safe_mode_until_it_gets_another_chance() {
+    let (_dir, chain) = support::chain_with(&[("restarts = 10", "restarts = 2")]);
+    for stage in 1..STAGES.len() {
+        let run = Run::new(&["--duration", "forever", "--chain", &chain]);
+        let mut child = run.start();
+        run.wait_for_sweeps(2);
+        // Two restarts as configured, then three lives with what is built in.
+        assert_eq!(crash_loop(&run, &mut child, stage, "stand-in"), 6);
+        run.wait_for_mode("safe");
+        assert_eq!(run.status().unwrap()["stages"][stage]["tier"], "stand-in");
+        run.wait_for_more(5);
+        let said: Vec<String> = run.events().iter().map(|event| event["name"].as_str().unwrap().to_owned()).collect();
+        for name in ["stage_died", "stage_restarted", "budget_spent", "safe_entered", "stand_in", "mode_entered"] {
+            assert!(said.iter().any(|said| said == name), "{name} of {said:?}");
+        }
+        run.ctl(&["resume"]);
+        run.wait_for_mode("nominal");
+        run.wait_for(|status| {
+            let stage = &status["stages"][stage];
+            stage["tier"] == "configured" && stage["restarts"] == 7 && stage["state"] == "running"
+        });
+        run.wait_for_more(5);
+        super_stop(&run);
+        let run = run.collect(child).expect_code(1);
+        assert!(run.is_closed(), "{}", run.stdout());
+        run.expect_every_sweep_accounted_for();
+        let says = format!("safe mode was entered: stage {:?} died more than 2 times", STAGES[stage]);
+        assert!(run.stderr().contains(&says), "{}", run.stderr());
+        assert_eq!(run.report["safe_entered"]["by"], "executive");
+        if STAGES[stage] == "recorder" {
+            continue;
+        }
+        // While it was stood in for, each sweep was answered, with nothing in it.
+        assert!(run.hop(STAGES[stage])["rejected"]["down"].as_u64().unwrap() >= 4 * 36, "{}", run.stdout());
+        let is_empty = |line: &&serde_json::Value| {
+            line["rejected_sectors"] == 36
+                && line["complete"] == false
+                && line["detections"].as_array().unwrap().is_empty()
+        };
+        assert!(run.detections.iter().filter(is_empty).count() >= 4);
+        let last = run.detections.last().unwrap()["detections"].as_array().unwrap();
+        assert!(last.iter().any(|detection| detection["class"] != "unclassified"), "classes are back");
+    }
+}
+
+#[test]
+fn a_source_that_keeps_dying_ends_the_run() {
     let run = Run::new(&["--duration", "forever"]);
     let mut child = run.start();
     run.wait_for_sweeps(2);
-    let mut kills = 0;
-    while child.try_wait().unwrap().is_none() {
-        assert!(kills < 50, "an endless restart loop");
-        let before = kills;
-        run.wait_for_or_end(&mut child, |status| {
-            let stage = &status["stages"][2];
-            stage["restarts"].as_u64() == Some(before) && stage["state"] == "running"
-        });
-        if child.try_wait().unwrap().is_none() {
-            let _ =
-                support::encke().args(["inject", "kill", "extractor", "--instance", &run.instance]).output().unwrap();
-        }
-        kills += 1;
-    }
+    // Ten restarts, then three lives with what is built in.
+    assert_eq!(crash_loop(&run, &mut child, 0, "stand-in"), 14);
     let run = run.collect(child).expect_code(1);
     assert!(run.is_closed(), "{}", run.stdout());
-    assert!(run.stderr().contains("\"extractor\" died more than 10 times"), "{}", run.stderr());
+    assert!(run.stderr().contains("stage \"source\" died 3 times more, built-in"), "{}", run.stderr());
+    assert_eq!(run.process("source")["pids"].as_array().unwrap().len(), 14);
+}
+
+#[test]
+fn a_stage_that_cannot_start_again_goes_on_with_what_is_built_in() {
+    let (dir, chain) = support::chain_with(&[]);
+    let run = Run::new(&["--duration", "forever", "--chain", &chain]);
+    let child = run.start();
+    run.wait_for_sweeps(3);
+    let model = dir.path().join("models/solids");
+    std::fs::create_dir_all(&model).unwrap();
+    std::fs::write(model.join("card.toml"), "no card").unwrap();
+    run.inject(&["kill", "classifier"]);
+    run.wait_for(|status| status["stages"][3]["tier"] == "built-in" && status["stages"][3]["state"] == "running");
+    run.wait_for_mode("safe");
+    run.wait_for_more(3);
+    // Mended, it may go on as configured.
+    std::fs::remove_dir_all(&model).unwrap();
+    run.ctl(&["resume"]);
+    run.wait_for_mode("nominal");
+    run.wait_for(|status| status["stages"][3]["tier"] == "configured" && status["stages"][3]["state"] == "running");
+    run.wait_for_more(3);
+    super_stop(&run);
+    let run = run.collect(child).expect_code(1);
+    assert!(run.is_closed(), "{}", run.stdout());
+    run.expect_every_sweep_accounted_for();
+    assert!(run.stderr().contains("stage \"classifier\" could not start again"), "{}", run.stderr());
+}
+
+#[test]
+fn restarts_by_command_count_against_no_budget() {
+    let (_dir, chain) = support::chain_with(&[("restarts = 10", "restarts = 0")]);
+    let run = Run::new(&["--duration", "forever", "--chain", &chain]);
+    let child = run.start();
+    run.wait_for_sweeps(2);
+    for restarts in 1..4 {
+        run.ctl(&[["restart", "extractor"].as_slice(), &["restart-chain"], &["restart", "source"]][restarts - 1]);
+        run.wait_for_more(2);
+    }
+    let status = run.status().unwrap();
+    let restarts: Vec<u64> =
+        status["stages"].as_array().unwrap().iter().map(|stage| stage["restarts"].as_u64().unwrap()).collect();
+    assert_eq!((restarts, status["mode"].as_str()), (vec![2, 1, 2, 1, 1], Some("nominal")));
+    stop_with_every_sweep_accounted_for(run, child);
 }
 
 fn super_stop(run: &Run) {

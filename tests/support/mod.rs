@@ -156,6 +156,28 @@ impl Run {
     }
 }
 
+impl Run {
+    /// Commands it; what it answers.
+    pub fn ctl(&self, args: &[&str]) -> String {
+        let output = encke().arg("ctl").args(args).args(["--instance", &self.instance]).output().unwrap();
+        assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    /// The running chain's mode, once it is in effect.
+    pub fn wait_for_mode(&self, mode: &str) {
+        self.wait_for(|status| status["mode"] == mode && !status["mode_took_ms"].is_null());
+    }
+
+    /// What stands in the running chain's log so far.
+    pub fn events(&self) -> Vec<Value> {
+        let dir = transport::Instance::named(&self.instance).unwrap().dir().to_owned();
+        let text = std::fs::read_to_string(dir.join("events.jsonl")).unwrap();
+        // The last line may be under way.
+        text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+    }
+}
+
 impl Finished {
     /// Asserts its exit code, showing what it said otherwise.
     pub fn expect_code(self, code: i32) -> Self {

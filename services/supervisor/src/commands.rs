@@ -1,6 +1,5 @@
 //! What commands do to a chain.
 
-use chain::Mode;
 use events::{CHAIN, EventId};
 
 use crate::SupervisorError;
@@ -82,7 +81,7 @@ impl Watch<'_> {
         self.wish(Wish::Resume);
         let mode = self.mode_in_words();
         if was_paused {
-            let more = if self.modes.mode() == Mode::Nominal { "" } else { "; resume again leads out of that" };
+            let more = if self.modes.is_held_down() { "; resume again leads out of that" } else { "" };
             return Ok(Answer::yes(format!("{mode}{more}")));
         }
         let restarted = self.renew_all()?;

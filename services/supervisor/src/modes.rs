@@ -127,6 +127,11 @@ impl Modes {
         self.safe
     }
 
+    /// Whether another [`Wish::Resume`] would lead to a mode that leaves out less.
+    pub(crate) fn is_held_down(&self) -> bool {
+        self.safe || self.floor > Step::Nominal
+    }
+
     /// Whether a mode was asked for that is not in effect yet.
     #[cfg(test)]
     fn is_changing(&self) -> bool {

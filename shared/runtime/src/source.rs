@@ -1,21 +1,20 @@
-use events::EventId;
+mod standing;
+
 use messages::{Cutter, Hop, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
 use stage::{Next, Source};
 use transport::{Loan, Outlet};
 
 use crate::kept::Kept;
 use crate::pacer::Pacer;
-use crate::page::{Said, State};
 use crate::run_delay::Laps;
 use crate::window::Window;
 use crate::{Pace, Shell, ShellError, clock};
+use standing::between_sweeps;
 
 /// Between two looks at the other pages while the window is shut [ns].
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
-/// Sensor time that leaps ahead by less is a gap in the recording [ns].
-const LEAP_NS: u64 = 5_000_000_000;
 /// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
 /// one that the sink has and has not yet written.
 const KEPT_BESIDE: usize = 2;
@@ -55,11 +54,6 @@ fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
         shell.beat();
         clock::sleep_ns(look_ns);
     }
-}
-
-/// Nothing is under way: the next sweep will be at the step that is asked for.
-fn between_sweeps(shell: &Shell) {
-    shell.page.step_sent.set(shell.page.step.get());
 }
 
 /// The way out of the source: a sweep is made as a whole and leaves in sectors, each when the sensor would have it.
@@ -180,50 +174,6 @@ impl<'a> Out<'a> {
 
     fn has_sweep(&self) -> bool {
         self.kept.has(self.ordinal / self.sectors())
-    }
-
-    /// Whether it is to stand still here.
-    fn is_to_pause(&self) -> bool {
-        self.is_between_sweeps() && self.shell.page.pause.get() > 0
-    }
-
-    /// Stands still between two sweeps as long as it is told to. Then time begins anew: nobody catches up.
-    fn pause_if_asked<S: Source>(&mut self, source: &mut S) {
-        if !self.is_to_pause() || self.shell.leaving() {
-            return;
-        }
-        let page = &self.shell.page;
-        page.paused.set(1);
-        while self.is_to_pause() && !self.shell.leaving() {
-            page.beat(clock::now_ns());
-            between_sweeps(self.shell);
-            source.discard();
-            clock::sleep_ns(PAUSE_LOOK_NS);
-        }
-        source.discard();
-        self.pacer.start_anew();
-        if self.has_sweep() {
-            // Made before, and not sent.
-            let now_ns = clock::now_ns();
-            let made = self.kept.get(self.ordinal / self.sectors());
-            made.start_ns = self.pacer.start_ns(made.whole.header.sensor_time_ns, now_ns);
-            made.began_ns = now_ns;
-        }
-        page.paused.set(0);
-    }
-
-    /// Waits at the end of the data, until it is told to leave or to send something again.
-    fn wait_at_the_end(&self) {
-        let page = &self.shell.page;
-        page.set_state(State::Ended);
-        wait_while(self.shell, LOOK_NS, || {
-            between_sweeps(self.shell);
-            page.paused.set(page.pause.get());
-            !self.is_asked_back()
-        });
-        if !self.shell.leaving() {
-            page.set_state(State::Running);
-        }
     }
 
     /// Makes the next sweep; [`Next::End`] also where no more was asked for, [`Next::Nothing`] when it is to stand still.
