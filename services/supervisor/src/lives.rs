@@ -48,6 +48,11 @@ impl Lives {
         Restarts::new(RestartBudget { restarts: LOWER_LIVES - 1, window_s: budget.window_s })
     }
 
+    /// Goes on where another supervisor stood.
+    pub(crate) fn take_over(&mut self, tier: Tier) {
+        self.tier = tier;
+    }
+
     /// Which build its next life is.
     pub(crate) fn tier(&self) -> Tier {
         self.tier

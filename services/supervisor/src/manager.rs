@@ -3,6 +3,7 @@
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
+use chain::executive::Condition;
 use events::{CHAIN, EventId};
 use runtime::clock;
 use runtime::page::State;
@@ -115,12 +116,18 @@ impl Watch<'_> {
     /// Names of the stages that are not well.
     fn unwell(&self) -> Vec<&str> {
         let now_ns = clock::now_ns();
-        let is_well = |page: &runtime::page::Page| now_ns.saturating_sub(page.heartbeat_ns.get()) < WELL_NS;
-        let unwell = self.stages.iter().filter(|stage| {
-            let ended = stage.page.state() == State::Stopped;
-            !stage.is_up() || stage.told || ended || !is_well(&stage.page)
+        let unwell = self.stages.iter().enumerate().filter(|(place, stage)| {
+            let page = &stage.page;
+            let is_alive = now_ns.saturating_sub(page.heartbeat_ns.get()) < WELL_NS && page.state() != State::Stopped;
+            // A sensor may be silent; slowness and floods are the executive's to answer.
+            let is_ill = self.executive.condition(*place).is_some_and(|condition| match condition {
+                Condition::Dead | Condition::Hung | Condition::Spinning => true,
+                Condition::Silent => *place > 0,
+                Condition::Slow | Condition::Flooding => false,
+            });
+            !stage.is_up() || stage.told || !is_alive || is_ill
         });
-        unwell.map(|stage| stage.name.as_str()).collect()
+        unwell.map(|(_, stage)| stage.name.as_str()).collect()
     }
 }
 

@@ -106,6 +106,12 @@ impl Modes {
         }
     }
 
+    /// Goes on where another supervisor stood: with what the source is told already.
+    pub(crate) fn take_over(&mut self, ladder: Step, safe: bool, paused: bool) {
+        (self.ladder, self.safe, self.paused) = (ladder, safe, paused);
+        self.mode = self.wished();
+    }
+
     /// The mode that was asked for last.
     pub(crate) fn mode(&self) -> Mode {
         self.mode
@@ -148,12 +154,7 @@ impl Modes {
             Wish::Resume if self.paused => self.paused = false,
             Wish::Resume => (self.safe, self.floor) = (false, Step::Nominal),
         }
-        let mode = match self.step() {
-            _ if self.paused => Mode::Paused,
-            _ if self.safe => Mode::Safe,
-            Step::Nominal => Mode::Nominal,
-            _ => Mode::Degraded,
-        };
+        let mode = self.wished();
         if mode == self.mode {
             return false;
         }
@@ -161,6 +162,15 @@ impl Modes {
         // One that was not in effect yet is overtaken: nobody waits for it any more.
         self.change = Some(Change { asked_ns: seen.now_ns, asked_published: seen.published, is_late: false });
         true
+    }
+
+    fn wished(&self) -> Mode {
+        match self.step() {
+            _ if self.paused => Mode::Paused,
+            _ if self.safe => Mode::Safe,
+            Step::Nominal => Mode::Nominal,
+            _ => Mode::Degraded,
+        }
     }
 
     /// Looks whether a change has taken effect, or should have.
@@ -199,6 +209,16 @@ mod tests {
 
     fn still(at_ms: u64) -> Seen {
         Seen { paused: true, ..seen(at_ms, 40, Step::Nominal) }
+    }
+
+    #[test]
+    fn a_successor_goes_on_in_the_mode_that_it_finds() {
+        let mut sut = Modes::new(4, true);
+        sut.take_over(Step::Nominal, true, true);
+        assert_eq!((sut.mode(), sut.step()), (Mode::Paused, Step::ClustersOnly));
+        assert!(!sut.is_changing(), "nothing was asked for");
+        assert!(sut.wish(Wish::Resume, still(10)));
+        assert_eq!(sut.mode(), Mode::Safe);
     }
 
     #[test]
