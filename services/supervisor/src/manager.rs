@@ -12,6 +12,8 @@ use crate::watch::Watch;
 
 /// Between two messages at most [ns].
 const PERIOD_NS: u64 = 1_000_000_000;
+/// The watchdog's hunger is an event when so many messages in a row were withheld.
+const SAID_AT: u32 = 2;
 /// A process whose last progress is older than this is not well [ns].
 const WELL_NS: u64 = 2_000_000_000;
 
@@ -25,8 +27,8 @@ pub(crate) struct Manager {
     next_ns: u64,
     ready: bool,
     stopping: bool,
-    /// The watchdog is not fed at present.
-    held: bool,
+    /// Messages in a row by which the watchdog was not fed.
+    held: u32,
 }
 
 impl Manager {
@@ -85,23 +87,28 @@ impl Watch<'_> {
         if stopping && !std::mem::replace(&mut self.manager.stopping, stopping) {
             self.manager.tell("STOPPING=1\nSTATUS=stopping: each stage drains its input\n");
         }
-        if !self.manager.is_due(now_ns) {
+        let begins = self.begun && !self.manager.ready;
+        if !self.manager.is_due(now_ns) && !begins {
             return;
         }
         if self.begun && !stopping {
             let sweep = self.stages[0].page.next_ordinal_out.get() / u64::from(self.plan.chain.sectors.max(1));
-            let ready = if std::mem::replace(&mut self.manager.ready, true) { "" } else { "READY=1\n" };
+            self.manager.ready = true;
+            let ready = if begins { "READY=1\n" } else { "" };
             self.manager.tell(&format!("{ready}STATUS={}, sweep {sweep}\n", self.mode_name()));
         }
         // Until all are up, the manager's limit for starts holds.
         let well = stopping || !self.begun || self.is_well();
-        if self.manager.watchdog && well {
-            self.manager.tell("WATCHDOG=1\n");
+        if !self.manager.watchdog {
+            return;
         }
-        if self.manager.watchdog && !well && !self.manager.held {
-            self.say(EventId::WatchdogHeld, CHAIN, &format!("not well: {}", self.unwell().join(", ")));
+        self.manager.held = if well { 0 } else { self.manager.held.saturating_add(1) };
+        match self.manager.held {
+            0 => self.manager.tell("WATCHDOG=1\n"),
+            // A restart may fall upon one message.
+            SAID_AT => self.say(EventId::WatchdogHeld, CHAIN, &format!("not well: {}", self.unwell().join(", "))),
+            _ => {}
         }
-        self.manager.held = !well;
     }
 
     fn mode_name(&self) -> &'static str {
