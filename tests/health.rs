@@ -87,7 +87,9 @@ fn a_stopped_stage_is_found_within_two_sweeps_alone_and_not_restarted_after_half
         clock::wait_for(500 * MS, || false);
         signal(&run, stage, Signal::CONT);
         run.wait_for_more(5);
-        let said = events.all().split_off(before);
+        let mut said = events.all().split_off(before);
+        // Parts are dropped each time, and a limit says so at last.
+        said.retain(|event| event["stage"] != "chain");
         let told: Vec<_> = said.iter().map(|event| (event["name"].as_str(), event["stage"].as_str())).collect();
         assert_eq!(told, [(Some("stage_hung"), Some(stage)), (Some("stage_well"), Some(stage))], "{said:?}");
         found_after_ms.push((said[0]["time_ns"].as_u64().unwrap() - stopped_ns) / MS);
@@ -115,7 +117,8 @@ fn a_stage_that_stays_stopped_is_started_again_and_output_comes_again() {
         signal(&run, stage, Signal::STOP);
         events.wait_for("stage_killed", stage);
         run.wait_for_more(5);
-        let said = events.all().split_off(before);
+        let mut said = events.all().split_off(before);
+        said.retain(|event| event["stage"] != "chain");
         let told: Vec<_> = said.iter().map(|event| (event["name"].as_str(), event["stage"].as_str())).collect();
         let expected = ["stage_hung", "stage_killed", "stage_died", "stage_well"].map(|name| (Some(name), Some(stage)));
         assert_eq!(told, expected, "{said:?}");

@@ -48,15 +48,16 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
         Classifier::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Classifier>(&shell)),
         Clusterer::NAME => {
             let stage = clusterer(&plan)?;
-            enter(plan).and_then(|shell| run_stage(stage, &shell))
+            enter(plan).and_then(|shell| run_stage(stage, &shell, |plan| clusterer(plan).map_err(in_words)))
         }
         Extractor::NAME => {
             let stage = extractor(&plan)?;
-            enter(plan).and_then(|shell| run_stage(stage, &shell))
+            enter(plan).and_then(|shell| run_stage(stage, &shell, |plan| extractor(plan).map_err(in_words)))
         }
         Classifier::NAME => {
             let stage = classifier(&plan, &assets)?;
-            enter(plan).and_then(|shell| run_stage(stage, &shell))
+            let rebuild = |plan: &Plan| classifier(plan, &assets).map_err(in_words);
+            enter(plan).and_then(|shell| run_stage(stage, &shell, rebuild))
         }
         RECORDER => {
             if is_stand_in {
@@ -118,6 +119,13 @@ pub(crate) fn check_stages(plan: &Plan, assets: &Assets) -> Result<(), Failure> 
         }
     }
     Ok(())
+}
+
+/// Why a stage could not be built.
+fn in_words(failure: Failure) -> String {
+    match failure {
+        Failure::Failed(cause) | Failure::CannotStart(cause) => cause,
+    }
 }
 
 fn unknown(name: &str) -> Failure {

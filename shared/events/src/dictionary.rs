@@ -116,7 +116,7 @@ dictionary! {
     CommandAccepted = 504, Info, "command_accepted", "", "A command was carried out.";
     CommandRefused = 505, Warning, "command_refused", "", "A command was not carried out: it was wrong, or came in a flood.";
     TableAccepted = 506, Info, "table_accepted", "", "New parameters hold and will be used from the sweep named on.";
-    TableRefused = 507, Error, "table_refused", "", "New parameters do not hold; the old ones stay in use.";
+    TableRefused = 507, Error, "table_refused", "generation {a} of the parameters does not hold", "New parameters do not hold; the old ones stay in use.";
     TableActive = 508, Info, "table_active", "parameters {a} are in use from sweep {b} on", "A stage uses its new parameters.";
 
     // 6xx: files

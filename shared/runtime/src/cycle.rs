@@ -7,22 +7,28 @@ use crate::reader::{Arrivals, Reader, serve};
 use crate::refused::Refused;
 use crate::run_delay::Laps;
 use crate::shell::WARM_UP_PARTS;
-use crate::{Shell, ShellError, clock};
+use crate::tables::Tables;
+use crate::{Plan, Shell, ShellError, clock};
 
-/// The main loop of every stage in the middle of the chain. Returns when the stage was asked to leave and has drained
-/// its input.
-pub fn run_stage<S: Stage>(stage: S, shell: &Shell) -> Result<(), ShellError> {
+/// The main loop of every stage in the middle of the chain, which `rebuild` builds anew from a plan with other
+/// parameters. Returns when the stage was asked to leave and has drained its input.
+pub fn run_stage<S: Stage>(
+    stage: S,
+    shell: &Shell,
+    rebuild: impl Fn(&Plan) -> Result<S, String>,
+) -> Result<(), ShellError> {
     let node = shell.join()?;
     let outlet = node.outlet::<S::Output>()?;
     let inlet = node.inlet::<S::Input>()?;
     shell.running();
-    serve(shell, &inlet, &mut Cycle::new(stage, shell, outlet))?;
+    serve(shell, &inlet, &mut Cycle::new(stage, shell, outlet, rebuild))?;
     shell.left();
     Ok(())
 }
 
-struct Cycle<'a, S: Stage> {
-    stage: S,
+struct Cycle<'a, S: Stage, B> {
+    tables: Tables<'a, S>,
+    rebuild: B,
     shell: &'a Shell,
     outlet: Outlet<S::Output>,
     arrivals: Arrivals<'a>,
@@ -31,19 +37,24 @@ struct Cycle<'a, S: Stage> {
     taken_by_others: Laps,
 }
 
-impl<'a, S: Stage> Cycle<'a, S> {
-    fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>) -> Self {
+impl<'a, S: Stage, B> Cycle<'a, S, B> {
+    fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>, rebuild: B) -> Self {
         let deadline = Deadline::of(&shell.plan, &shell.name);
         let taken_by_others = Laps::of_this_thread();
-        let (arrivals, refused) = (Arrivals::new(shell), Refused::default());
-        Self { stage, shell, outlet, arrivals, deadline, refused, taken_by_others }
+        let tables = Tables::new(&shell.page, stage, shell.plan.kept_sweeps() as u64);
+        Self { tables, rebuild, shell, outlet, arrivals: Arrivals::new(shell), deadline, taken_by_others }
     }
 }
 
-impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
+/// Builds a stage from the latest plan.
+fn build<S>(shell: &Shell, rebuild: impl Fn(&Plan) -> Result<S, String>) -> Result<S, String> {
+    rebuild(&Plan::read(&shell.instance).map_err(|cause| cause.to_string())?)
+}
+
+impl<S: Stage, B: Fn(&Plan) -> Result<S, String>> Reader<S::Input> for Cycle<'_, S, B> {
     /// One part: receive → in hand → process → send → published → counted → out of hand → release.
     fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
-        let Self { stage, shell, outlet, arrivals, deadline, refused, taken_by_others } = self;
+        let Self { tables, rebuild, shell, outlet, arrivals, deadline, taken_by_others } = self;
         let page = &shell.page;
         let received_ns = clock::now_ns();
         let mut trace: Trace = *taken.trace();
@@ -51,6 +62,7 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
             return Ok(());
         }
 
+        let stage = tables.at(trace.part.sweep, || build(shell, &*rebuild));
         let before_shell = (shell.allocations)();
         let mut loan = outlet.loan()?;
         let taken_before_ns = taken_by_others.lap_ns();
@@ -89,7 +101,9 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         page.count_sent(trace.part);
         page.count_verdict(verdict);
         page.put_down();
-        refused.note(page, &trace.part, verdict);
+        if trace.part.is_last() {
+            tables.sweep_ended();
+        }
 
         arrivals.parts += 1;
         if arrivals.parts > WARM_UP_PARTS {
@@ -99,6 +113,11 @@ impl<S: Stage> Reader<S::Input> for Cycle<'_, S> {
         }
         arrivals.free_ns = clock::now_ns();
         page.sent_ns.set(arrivals.free_ns);
+        Ok(())
+    }
+
+    fn idle(&mut self) -> Result<(), ShellError> {
+        self.tables.build_if_wanted(|| build(self.shell, &self.rebuild));
         Ok(())
     }
 }

@@ -22,7 +22,7 @@ mod shell;
 mod shutdown;
 mod sink;
 mod source;
-mod stand_in;
+mod tables;
 mod tap;
 mod window;
 

@@ -12,6 +12,10 @@ use crate::ShellError;
 /// Name of the source among the stages of a chain.
 pub const SOURCE: &str = "source";
 
+/// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
+/// one that the sink has and has not yet written.
+const KEPT_BESIDE: usize = 2;
+
 /// Name of the process that reads along and keeps what the chain says.
 pub const TAPE: &str = "tape";
 
@@ -150,6 +154,18 @@ impl Plan {
     /// Name of the process that reads along and writes [`Outputs::record`], where there is one.
     pub fn tape(&self) -> Option<&'static str> {
         self.outputs.record.is_some().then_some(TAPE)
+    }
+
+    /// The next generation: other parameters of stages, by name (those left out stay), and another table of the executive.
+    pub fn replace_tables(&mut self, parameters: BTreeMap<String, String>, executive: Executive) {
+        self.parameters.extend(parameters);
+        self.executive = executive;
+        self.generation += 1;
+    }
+
+    /// Sweeps that the source may send again at [`Pace::Fast`].
+    pub fn kept_sweeps(&self) -> usize {
+        self.chain.queue_sweeps + KEPT_BESIDE
     }
 
     /// Parts that may be in flight at [`Pace::Fast`]. Half a queue: after a death up to twice as many may be.

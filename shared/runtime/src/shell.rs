@@ -65,6 +65,7 @@ impl Shell {
         page.pid.set(u64::from(std::process::id()));
         page.set_state(State::Starting);
         page.incarnation.set(before + 1);
+        page.table_active.set(plan.generation);
         page.beat(clock::now_ns());
         let shell = Self {
             name: name.to_owned(),

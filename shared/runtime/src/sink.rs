@@ -7,8 +7,7 @@ use transport::Taken;
 
 use crate::page::Said;
 use crate::reader::{Arrivals, Reader, serve};
-use crate::refused::Refused;
-use crate::{Pace, Shell, ShellError, clock};
+use crate::{Shell, ShellError, clock, tables};
 
 /// Time between two checkpoints [ns].
 const CHECKPOINT_NS: u64 = 1_000_000_000;
@@ -103,6 +102,7 @@ impl<K: Sink> Reader<K::Input> for End<'_, K> {
     }
 
     fn idle(&mut self) -> Result<(), ShellError> {
+        tables::acknowledge(&self.shell.page);
         if clock::now_ns() >= self.checkpoint_ns {
             self.checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
             self.tell_failures();

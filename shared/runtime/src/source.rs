@@ -8,16 +8,12 @@ use crate::kept::Kept;
 use crate::pacer::Pacer;
 use crate::run_delay::Laps;
 use crate::window::Window;
-use crate::{Pace, Shell, ShellError, clock};
-use standing::between_sweeps;
+use crate::{Pace, Shell, ShellError, clock, tables};
 
 /// Between two looks at the other pages while the window is shut [ns].
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
-/// Sweeps that are kept beside those that wait in a queue, where they may have to be sent again: the one under way, and
-/// one that the sink has and has not yet written.
-const KEPT_BESIDE: usize = 2;
 
 /// The main loop of the source. Returns when it was asked to leave; at the end of the data it waits for that, because
 /// what it has sent lives in its shared memory, and may have to be sent again.
@@ -32,6 +28,7 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
 
     out.begin(&mut source)?;
     while !(shell.leaving() && out.is_between_sweeps()) {
+        tables::acknowledge(&shell.page);
         out.go_back_if_asked();
         if !out.has_sweep() && !out.make(&mut source)? {
             out.tell_end();
@@ -51,7 +48,8 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
 /// Sleeps as long as `holds`, alive, or until asked to leave.
 fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
     while holds() && !shell.leaving() {
-        shell.beat();
+        tables::acknowledge(&shell.page);
+        shell.page.beat(clock::now_ns());
         clock::sleep_ns(look_ns);
     }
 }
@@ -84,7 +82,7 @@ impl<'a> Out<'a> {
         let plan = &shell.plan;
         let (window, keep) = match plan.pace {
             Pace::Realtime => (None, 1),
-            Pace::Fast => (Some(Window::open(shell)?), plan.chain.queue_sweeps + KEPT_BESIDE),
+            Pace::Fast => (Some(Window::open(shell)?), plan.kept_sweeps()),
         };
         Ok(Self {
             shell,

@@ -3,8 +3,8 @@ use messages::{Clusters, Descriptors, Detections, Message, Order, Place, Sweep, 
 use stage::Tap;
 use transport::Node;
 
-use crate::page::{Page, PageMap, Said};
-use crate::{Pace, Plan, SOURCE, Shell, ShellError, clock, realtime};
+use crate::page::{Page, PageMap};
+use crate::{Pace, Plan, SOURCE, Shell, ShellError, clock, realtime, tables};
 
 /// Between two looks into the queues where the source waits for what is found [ns].
 const LOOK_NS: u64 = 500_000;
@@ -40,6 +40,7 @@ pub fn run_tap<T: Tap>(mut tap: T, shell: &Shell) -> Result<(), ShellError> {
         }
         if clock::now_ns() >= tick_ns {
             tick_ns = clock::now_ns() + TICK_NS;
+            tables::acknowledge(page);
             tap.tick(clock::utc_ns());
             keep(&mut tap, shell);
             tell_files(&mut tap, shell, &mut files);

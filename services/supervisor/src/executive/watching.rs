@@ -1,6 +1,6 @@
 //! Where the supervisor's loop looks after the health of its processes.
 
-use chain::executive::{Action, Condition};
+use chain::executive::Condition;
 use events::{CHAIN, EventId};
 use runtime::page::Page;
 use runtime::{Pace, TAPE, clock};
@@ -8,7 +8,7 @@ use runtime::{Pace, TAPE, clock};
 use super::limits::{LimitChange, LimitState};
 use super::signs::{Signs, source_is_idle};
 use super::values::Sources;
-use super::{Executive, Finding, Flow, Order, word};
+use super::{Finding, Flow, Order, word};
 use crate::watch::Watch;
 
 impl Watch<'_> {
