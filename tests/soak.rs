@@ -73,7 +73,7 @@ fn a_chain_without_faults_holds_for_a_while() {
     assert_eq!((&overall["missing"], &overall["broken"]), (&0.into(), &0.into()), "{}", soaked.said);
     assert_eq!(soaked.bar("change of file descriptors")["passed"], true);
     let samples = std::fs::read_to_string(soaked.dir.path().join("out/samples.csv")).unwrap();
-    assert!(samples.lines().count() >= 15 && samples.lines().all(|line| line.split(',').count() == 42), "{samples}");
+    assert!(samples.lines().count() >= 15 && samples.lines().all(|line| line.split(',').count() == 48), "{samples}");
     let events = std::fs::read_to_string(soaked.dir.path().join("out/events.jsonl")).unwrap();
     assert!(events.contains("run_began"), "{events}");
     assert!(soaked.verdict["observer"]["looks"].as_u64().unwrap() > 1_000);
@@ -125,14 +125,36 @@ fn after_a_death_of_all_processes_the_next_start_is_clean() {
     assert!(cycles.len() == 3 && cycles.iter().all(|cycle| cycle["killed"].is_string()));
 }
 
+/// Steps that the day in the life begins and ends with; its long form is config/faults/day.toml.
+const DAY: &str = r#"
+kind = "day"
+tape = "faults/day-tape.toml"
+[[step]]
+name = "nominal"
+nominal_s = 4.0
+[[step]]
+name = "a command that there is not"
+refused = ["ctl", "party"]
+[[step]]
+name = "the classifier is killed"
+inject = ["kill", "classifier"]
+[[step]]
+name = "the recording is in more than one file"
+rotated = 2
+[[step]]
+name = "shutdown"
+shutdown = true
+[[step]]
+name = "its own recording, again"
+replay = true
+"#;
+
 #[test]
-fn the_same_seed_plans_the_same_faults() {
-    let campaign = "kind = \"kills\"\ntimes = 1\nspacing_s = 1.0\nagain_share = 0.0\nagain_within_ms = 0.0\n";
-    let planned = |seed: &str| soak(&["--seed", seed], Some(campaign)).verdict["planned"].clone();
-    let first = planned("5");
-    assert!(first.as_array().is_some_and(|list| list.len() == STAGES.len()));
-    assert_eq!(first, planned("5"));
-    assert_ne!(first, planned("6"));
+fn a_short_day_ends_with_the_same_detections_from_its_own_recording() {
+    let soaked = soak(&[], Some(DAY)).expect_passed();
+    let steps = soaked.verdict["steps"].as_array().unwrap();
+    assert!(steps.len() == 6 && steps.iter().all(|step| step["passed"] == true), "{steps:?}");
+    assert!(steps[5]["note"].as_str().unwrap().ends_with(" compared, 0 differ"), "{steps:?}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use supervisor::Report;
 
 use crate::bars::Bars;
-use crate::look::{ProcessRecord, SETTLE_S, Steady};
+use crate::look::{Growth, ProcessRecord, SETTLE_S, Steady};
 use crate::matrix::Row;
 use crate::statistics::Drift;
 use crate::verdict::{Available, Bar, SharedMemoryRecord};
@@ -135,23 +135,31 @@ impl Facts<'_> {
             .then(|| format!("others took {foreign:.0} % of a core, more than {:.0} %", self.bars.idle_pct))
     }
 
-    fn memory(&self, most_pct: f64) -> [Bar; 2] {
-        let grown: Vec<_> = self.processes.iter().filter_map(|of| Some((&of.process, of.memory_kib?))).collect();
+    /// Memory of all kinds, and what is a process's own. How much of the queues in shared memory is touched depends on who has the
+    /// cores; what a process has for itself does not.
+    fn memory(&self, most_pct: f64) -> Vec<Bar> {
+        let busy = self.busy();
+        let all = self.growth("memory", |of| of.memory_kib, most_pct);
+        let own = self.growth("memory of its own", |of| of.own_memory_kib, most_pct);
+        // Too short is the better reason.
+        let judged = |bar: Bar| if bar.passed.is_none() { bar } else { bar.unless(busy.as_deref()) };
+        all.into_iter().map(judged).chain(own).collect()
+    }
+
+    fn growth(&self, what: &str, of: fn(&ProcessRecord) -> Option<Growth>, most_pct: f64) -> [Bar; 2] {
+        let grown: Vec<_> = self.processes.iter().filter_map(|one| Some((&one.process, of(one)?))).collect();
         let worst = grown.iter().max_by(|(_, one), (_, other)| one.growth_pct.total_cmp(&other.growth_pct));
         let short = (grown.len() < self.processes.len() || grown.is_empty())
             .then(|| format!("needs more than {SETTLE_S:.0} s and a few minutes"));
-        let growth = Bar::at_most(
-            &format!("memory growth after {SETTLE_S:.0} s, the worst process"),
-            worst.map(|(_, growth)| growth.growth_pct),
-            most_pct,
-            "%",
-        );
+        let value = worst.map(|(_, growth)| growth.growth_pct);
+        let growth =
+            Bar::at_most(&format!("growth of {what} after {SETTLE_S:.0} s, worst process"), value, most_pct, "%");
         let note = worst.map_or(String::new(), |(process, growth)| {
             format!("{process}: {:.0} to {:.0} KiB", growth.first, growth.last)
         });
         let sloping: Vec<_> = grown.iter().filter(|(_, growth)| !growth.per_hour.may_be_zero()).collect();
         let names = sloping.iter().map(|(process, growth)| format!("{process} {:+.1} KiB/h", growth.per_hour.slope));
-        let slopes = Bar::none("processes whose memory slope's 95 % interval excludes 0", sloping.len());
+        let slopes = Bar::none(&format!("processes whose slope of {what} is not 0 (95 %)"), sloping.len());
         [
             growth.noting(note).unless(short.as_deref()),
             slopes.noting(names.collect::<Vec<_>>().join(", ")).unless(short.as_deref()),
@@ -165,7 +173,9 @@ impl Facts<'_> {
         let short = growth.is_none().then_some("too short a run");
         let value = growth.map(|growth| growth.growth_pct);
         let name = format!("growth of shared memory taken, after {SETTLE_S:.0} s");
-        Bar::at_most(&name, value, self.bars.no_faults.shared_memory_growth_pct, "%").noting(note).unless(short)
+        Bar::at_most(&name, value, self.bars.no_faults.shared_memory_growth_pct, "%")
+            .noting(note)
+            .unless(short.or(self.busy().as_deref()))
     }
 
     fn constants(&self) -> [Bar; 5] {

@@ -205,10 +205,12 @@ impl Campaign {
 mod tests {
     use super::*;
 
-    const SHIPPED: [(&str, &str, &str); 3] = [
+    const SHIPPED: [(&str, &str, &str); 5] = [
         ("kills", "kills", include_str!("../../../../config/faults/kills.toml")),
         ("kill-all", "kill-all", include_str!("../../../../config/faults/kill-all.toml")),
         ("cycles", "cycles", include_str!("../../../../config/faults/cycles.toml")),
+        ("mode-changes", "mode-changes", include_str!("../../../../config/faults/mode-changes.toml")),
+        ("day", "day", include_str!("../../../../config/faults/day.toml")),
     ];
 
     #[test]

@@ -278,10 +278,11 @@ impl<'a> Observer<'a> {
                 sampled.files[place] = sampled.files[place].max(used.files);
                 sampled.threads[place] = sampled.threads[place].max(used.threads);
             }
-            row.extend(used.map_or(vec![String::new(); 5], |used| {
+            row.extend(used.map_or(vec![String::new(); 6], |used| {
                 vec![
                     used.pid.to_string(),
                     used.rss_kib.to_string(),
+                    used.own_kib.to_string(),
                     used.files.to_string(),
                     used.threads.to_string(),
                     format!("{:.2}", used.cpu_s),
@@ -348,7 +349,7 @@ fn push<T>(latest: &mut VecDeque<T>, value: T) {
 fn columns(names: &[String]) -> Vec<String> {
     let mut columns = vec!["t_s".to_owned()];
     for name in names {
-        columns.extend(["pid", "rss_kib", "files", "threads", "cpu_s"].map(|what| format!("{name}_{what}")));
+        columns.extend(["pid", "rss_kib", "own_kib", "files", "threads", "cpu_s"].map(|what| format!("{name}_{what}")));
     }
     let more = [
         "shared_files",

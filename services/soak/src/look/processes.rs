@@ -12,6 +12,8 @@ pub(crate) struct Use {
     pub(crate) pid: u64,
     /// Memory resident.
     pub(crate) rss_kib: u64,
+    /// Of that, what is its own: neither shared memory nor files.
+    pub(crate) own_kib: u64,
     /// File descriptors open.
     pub(crate) files: u64,
     /// Threads.
@@ -24,9 +26,10 @@ impl Use {
     /// Of a process; none when it is gone.
     pub(crate) fn of(pid: u64) -> Option<Self> {
         let (cpu_s, threads, rss_kib) = parse(&fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
+        let own_kib = parse_own(&fs::read_to_string(format!("/proc/{pid}/statm")).ok()?)?;
         let files = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as u64;
         // A process that has ended and was not waited for yet has none of all this.
-        (threads > 0 && rss_kib > 0).then_some(Self { pid, rss_kib, files, threads, cpu_s })
+        (threads > 0 && rss_kib > 0).then_some(Self { pid, rss_kib, own_kib, files, threads, cpu_s })
     }
 }
 
@@ -37,6 +40,13 @@ fn parse(stat: &str) -> Option<(f64, u64, u64)> {
     let field = |number: usize| fields.get(number - 3)?.parse::<u64>().ok();
     let cpu_s = (field(14)? + field(15)?) as f64 / clock_ticks_per_second() as f64;
     Some((cpu_s, field(20)?, field(24)? * page_size() as u64 / 1024))
+}
+
+/// Resident memory that is neither shared nor of files [KiB], of a `/proc/PID/statm`: field 2 less field 3, in pages.
+fn parse_own(statm: &str) -> Option<u64> {
+    let mut fields = statm.split_whitespace().skip(1).map(str::parse::<u64>);
+    let (resident, shared) = (fields.next()?.ok()?, fields.next()?.ok()?);
+    Some(resident.saturating_sub(shared) * page_size() as u64 / 1024)
 }
 
 /// CPU time of this process so far [s].
@@ -74,7 +84,8 @@ mod tests {
     #[test]
     fn this_process_can_be_looked_at() {
         let sut = Use::of(u64::from(std::process::id())).unwrap();
-        assert!(sut.rss_kib > 0 && sut.files >= 3 && sut.threads >= 1);
+        assert_eq!(parse_own("900 300 100 5 0 40 0"), Some(200 * page_size() as u64 / 1024));
+        assert!(sut.rss_kib >= sut.own_kib && sut.own_kib > 0 && sut.files >= 3 && sut.threads >= 1);
         assert_eq!(Use::of(u64::from(u32::MAX)), None);
     }
 }

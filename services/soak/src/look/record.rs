@@ -117,6 +117,7 @@ struct Life {
     from_s: f64,
     until_s: f64,
     rss_kib: Level,
+    own_kib: Level,
     files: Level,
     threads: Level,
 }
@@ -132,6 +133,8 @@ pub struct ProcessRecord {
     pub longest_s: f64,
     /// How memory grew after its first five minutes; null where it did not live for so long.
     pub memory_kib: Option<Growth>,
+    /// The same of what is its own: neither shared memory nor files.
+    pub own_memory_kib: Option<Growth>,
     /// File descriptors; null where the life was too short.
     pub files: Option<Steady>,
     /// Threads; null where the life was too short.
@@ -149,14 +152,15 @@ impl Record {
         if self.present.as_ref().is_none_or(|life| life.pid != used.pid) {
             self.lives += 1;
             let level = || Level::new(self.stretch_s);
-            let (rss_kib, files, threads) = (level(), level(), level());
-            let life = Life { pid: used.pid, from_s: t_s, until_s: t_s, rss_kib, files, threads };
+            let [rss_kib, own_kib, files, threads] = [level(), level(), level(), level()];
+            let life = Life { pid: used.pid, from_s: t_s, until_s: t_s, rss_kib, own_kib, files, threads };
             let before = self.present.replace(life);
             self.keep(before);
         }
         if let Some(life) = &mut self.present {
             life.until_s = t_s;
             life.rss_kib.add(t_s, used.rss_kib);
+            life.own_kib.add(t_s, used.own_kib);
             life.files.add(t_s, used.files);
             life.threads.add(t_s, used.threads);
         }
@@ -178,6 +182,7 @@ impl Record {
             lives: self.lives,
             longest_s: life.map_or(0.0, |life| life.until_s - life.from_s),
             memory_kib: life.and_then(|life| life.rss_kib.growth(life.from_s + SETTLE_S)),
+            own_memory_kib: life.and_then(|life| life.own_kib.growth(life.from_s + SETTLE_S)),
             files: life.and_then(|life| life.files.steady(life.from_s + settle_s)),
             threads: life.and_then(|life| life.threads.steady(life.from_s + settle_s)),
         }
@@ -189,7 +194,7 @@ mod tests {
     use super::*;
 
     fn used(pid: u64, rss_kib: u64, files: u64) -> Use {
-        Use { pid, rss_kib, files, threads: 2, cpu_s: 0.0 }
+        Use { pid, rss_kib, own_kib: rss_kib / 2, files, threads: 2, cpu_s: 0.0 }
     }
 
     #[test]

@@ -111,7 +111,7 @@ impl Plot<'_> {
             return 0.0..1.0;
         }
         if self.from_zero {
-            return 0.0..(1.08 * most).max(1e-3);
+            return 0.0..(1.08 * most).max(1.0);
         }
         let room = (0.1 * (most - least)).max(0.02 * most.abs()).max(0.5);
         (least - room).max(0.0)..most + room

@@ -178,6 +178,8 @@ pub(super) fn processes(verdict: &Verdict) -> String {
         "#slope [KiB/h]",
         "#95 % interval",
         "#independent points",
+        "#its own [KiB]",
+        "#slope [KiB/h]",
         "#files (most)",
         "#threads (most)",
     ];

@@ -11,6 +11,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Share of a distribution below the upper end of a 95 % interval.
 const UPPER: f64 = 0.975;
 
+/// Fewer degrees of freedom say nothing.
+const LEAST_FREEDOM: f64 = 1.0;
+
 /// A straight line through a series.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Slope {
@@ -53,7 +56,7 @@ impl Slope {
         let autocorrelation = (products / squares).clamp(0.0, 1.0);
         let effective_points = n * (1.0 - autocorrelation) / (1.0 + autocorrelation);
         let freedom = effective_points - 2.0;
-        let quantile = (freedom > 0.0).then(|| StudentsT::new(0.0, 1.0, freedom).ok()).flatten();
+        let quantile = (freedom >= LEAST_FREEDOM).then(|| StudentsT::new(0.0, 1.0, freedom).ok()).flatten();
         let interval = quantile.map(|student| {
             let half = student.inverse_cdf(UPPER) * (squares / freedom / sxx).sqrt();
             [slope - half, slope + half]
