@@ -25,6 +25,7 @@ const RECORDER: &str = "recorder";
 /// Is one stage of a running instance, until told to leave.
 pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
+    runtime::logging::abort_at_once_on_panic();
     let instance = Instance::named(&args.instance).map_err(Failure::start)?;
     let mut plan = Shell::find_plan(&instance).map_err(Failure::start)?;
     let mut assets = Assets::in_dirs(plan.config_dirs.clone());

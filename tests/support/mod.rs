@@ -154,6 +154,19 @@ impl Run {
         let output = encke().arg("inject").args(args).args(["--instance", &self.instance]).output().unwrap();
         assert!(output.status.success(), "{}", text(&output.stderr));
     }
+
+    /// Puts a fault into it as soon as it has the process that the fault is for.
+    pub fn inject_when_up(&self, args: &[&str]) {
+        let mut inject = encke();
+        inject.arg("inject").args(args).args(["--instance", &self.instance]);
+        for _ in 0..1_500 {
+            if inject.output().unwrap().status.success() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("no process for {args:?} in 30 s");
+    }
 }
 
 impl Run {

@@ -247,13 +247,13 @@ catalogue! {
     DiskFull = 220, "disk-full", Writer, None, Time(2.0), "", Some(FileFailed), "that file is closed and counted; the chain goes on",
         "Files do not grow any more (RLIMIT_FSIZE).";
     ReadOnly = 221, "read-only", Writer, None, Time(2.0), "", Some(FileFailed), "that file is closed and counted; the chain goes on",
-        "The file system of the outputs is mounted read-only. Only where one may mount.";
+        "The folder of its outputs is mounted read-only, and it is killed. Only where one may mount.";
     ConfigCorruption = 222, "config-corruption", Parameters, count("bytes", 1.0, 64.0, 8.0), Time(1.0), "dead",
         Some(StageDied), "restarted, with built-in parameters where its own do not hold",
-        "Bytes of its parameters in the plan are flipped, and it is killed; they are put back later.";
+        "Bytes of its parameters are flipped in the plan of the run, and it is killed; it is put right later.";
     ModelCorruption = 223, "model-corruption", Model, count("bytes", 1.0, 64.0, 8.0), Time(1.0), "dead",
         Some(StageDied), "restarted, with the built-in model where its own does not hold",
-        "Bytes of its model's files are flipped, and it is killed; they are put back later. Needs a configuration folder.";
+        "Bytes of its model are flipped, in a copy that this chain alone reads, and it is killed; it is put right later.";
     CommandFlood = 230, "command-flood", Chain, count("lines a second", 1.0, 100_000.0, 10_000.0), Time(2.0), "",
         Some(CommandRefused), "refused and counted",
         "A client sends commands without end.";

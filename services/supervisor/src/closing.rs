@@ -1,6 +1,5 @@
 //! What a chain has used and done, gathered while it runs and told at its end.
 
-use events::{CHAIN, EventId};
 use recorder::Snapshot;
 use runtime::page::Page;
 use runtime::{Plan, clock};
@@ -28,29 +27,8 @@ impl Watch<'_> {
         let own_cpu_s = processes().map(|process| process.usage.cpu_s()).sum::<f64>() + self.usage.cpu_s();
         let now_ns = clock::now_ns();
         let machine = self.machine.look(now_ns, own_cpu_s);
-        self.look_for_files();
-        let processes = || self.stages.iter().chain(self.tape.iter().map(|tape| &tape.process));
         let usages = processes().map(|process| &process.usage).chain([&self.usage]);
         self.timeline.look(now_ns, usages, machine, self.noise.take_latest_ns());
-    }
-
-    /// Stops the chain in order when its files in shared memory were deleted: a process that starts later could not join it.
-    fn look_for_files(&mut self) {
-        if !self.begun || self.stop_asked || self.failed.is_some() {
-            return;
-        }
-        let beside = self.tape.iter().map(|tape| &tape.process);
-        let lives = self.stages.iter().chain(beside).map(|one| {
-            let up = u64::from(one.is_up());
-            one.page.incarnation.get() + one.page.settled_incarnation.get() + up
-        });
-        let lives = lives.sum();
-        let gone = self.shared_memory.gone(self.instance.shared_memory(), lives);
-        if gone > 0 {
-            let text = format!("{gone} files of the chain in shared memory were deleted by somebody else");
-            self.say(EventId::SharedMemoryGone, CHAIN, &text);
-            self.failed = Some(format!("{text}: the chain was stopped"));
-        }
     }
 
     fn overload_report(&mut self) -> OverloadReport {

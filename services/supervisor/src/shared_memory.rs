@@ -3,38 +3,74 @@
 
 use std::collections::BTreeSet;
 
+use events::{CHAIN, EventId};
+
+use crate::watch::Watch;
+
 /// Files of services: there from the first process to the last.
 const OF_SERVICES: &str = ".dynamic";
 /// Files of writers: there as long as their process.
 const OF_WRITERS: &str = ".data";
 
-/// The files at the last look.
+/// Between two looks [ns].
+const LOOK_NS: u64 = 500_000_000;
+
+/// The files that should be there.
 #[derive(Default)]
 pub(crate) struct SharedMemory {
     services: BTreeSet<String>,
     writers: BTreeSet<String>,
-    /// Sum of all lives at that look.
+    /// Sum of all lives when those of writers were noted.
     lives: u64,
+    /// Were missing at the last look. A process that leaves takes its files with it a moment before it is seen to have left.
+    missing: BTreeSet<String>,
+    next_look_ns: u64,
 }
 
 impl SharedMemory {
-    /// How many files have gone since the last look that should be there. `lives` is a number that changes when a process
-    /// starts or ends: those of writers may come and go with it.
+    /// Whether it is time to look again.
+    pub(crate) fn is_due(&mut self, now_ns: u64) -> bool {
+        let due = now_ns >= self.next_look_ns;
+        if due {
+            self.next_look_ns = now_ns + LOOK_NS;
+        }
+        due
+    }
+
+    /// How many files that should be there were missing at this look and at the one before. `lives` is a number that changes
+    /// when a process starts or is settled: files of writers may come and go with it.
     pub(crate) fn gone(&mut self, names: Vec<String>, lives: u64) -> usize {
-        let (mut services, mut writers) = (BTreeSet::new(), BTreeSet::new());
-        for name in names {
-            if name.ends_with(OF_SERVICES) {
-                services.insert(name);
-            } else if name.ends_with(OF_WRITERS) {
-                writers.insert(name);
-            }
+        let names: BTreeSet<String> = names.into_iter().collect();
+        if lives != self.lives {
+            (self.writers, self.lives) = (BTreeSet::new(), lives);
         }
-        let mut gone = self.services.difference(&services).count();
-        if lives == self.lives {
-            gone += self.writers.difference(&writers).count();
-        }
-        (self.services, self.writers, self.lives) = (services, writers, lives);
+        let expected = self.services.union(&self.writers);
+        let missing: BTreeSet<String> = expected.filter(|name| !names.contains(*name)).cloned().collect();
+        let gone = missing.intersection(&self.missing).count();
+        self.missing = missing;
+        self.services.extend(names.iter().filter(|name| name.ends_with(OF_SERVICES)).cloned());
+        self.writers.extend(names.into_iter().filter(|name| name.ends_with(OF_WRITERS)));
         gone
+    }
+}
+
+impl Watch<'_> {
+    /// Stops the chain in order when its files in shared memory were deleted: a process that starts later could not join it,
+    /// because the services can be created anew only when nobody has the old ones.
+    pub(crate) fn look_for_files(&mut self, now_ns: u64) {
+        let ending = self.stop_asked || self.failed.is_some() || self.stages.iter().any(|stage| stage.told);
+        if !self.begun || ending || !self.shared_memory.is_due(now_ns) {
+            return;
+        }
+        let beside = self.tape.iter().map(|tape| &tape.process);
+        let lives = self.stages.iter().chain(beside);
+        let lives = lives.map(|one| one.page.incarnation.get() + one.page.settled_incarnation.get()).sum();
+        let gone = self.shared_memory.gone(self.instance.shared_memory(), lives);
+        if gone > 0 {
+            let text = format!("{gone} files of the chain in shared memory were deleted by somebody else");
+            self.say(EventId::SharedMemoryGone, CHAIN, &text);
+            self.failed = Some(format!("{text}: the chain was stopped"));
+        }
     }
 }
 
@@ -50,17 +86,26 @@ mod tests {
     fn what_a_process_takes_with_it_is_not_gone() {
         let mut sut = SharedMemory::default();
         assert_eq!(sut.gone(names(&["a.dynamic", "w.data", "c.connection"]), 5), 0);
-        assert_eq!(sut.gone(names(&["a.dynamic", "v.data"]), 6), 0, "a writer died, and another one came");
+        assert_eq!(sut.gone(names(&["a.dynamic"]), 5), 0, "a writer has just left");
+        assert_eq!(sut.gone(names(&["a.dynamic", "v.data"]), 6), 0, "another one came");
         assert_eq!(sut.gone(names(&["a.dynamic", "v.data"]), 6), 0);
         assert_eq!(sut.gone(names(&["a.dynamic", "v.data", "b.dynamic"]), 6), 0);
     }
 
     #[test]
-    fn what_goes_while_all_live_was_deleted() {
+    fn what_stays_away_while_all_live_was_deleted() {
         let mut sut = SharedMemory::default();
         sut.gone(names(&["a.dynamic", "w.data", "c.connection"]), 5);
-        assert_eq!(sut.gone(names(&["a.dynamic"]), 5), 1);
-        assert_eq!(sut.gone(names(&[]), 6), 1, "a service lives as long as the chain");
-        assert_eq!(sut.gone(names(&[]), 6), 0, "each is told once");
+        assert_eq!((sut.gone(names(&["a.dynamic"]), 5), sut.gone(names(&["a.dynamic"]), 5)), (0, 1));
+        let mut sut = SharedMemory::default();
+        sut.gone(names(&["a.dynamic", "w.data"]), 5);
+        assert_eq!((sut.gone(names(&[]), 6), sut.gone(names(&[]), 7)), (0, 1), "a service lives as long as the chain");
+    }
+
+    #[test]
+    fn looks_are_half_a_second_apart() {
+        let mut sut = SharedMemory::default();
+        let due = [1, 2, LOOK_NS, LOOK_NS + 1].map(|now_ns| sut.is_due(now_ns));
+        assert_eq!(due, [true, false, false, true]);
     }
 }

@@ -364,7 +364,7 @@ impl<'a> Watch<'a> {
             self.next_sample_ns = now_ns + SAMPLE_NS;
             self.sample();
         }
-        self.tell_of_refusals(now_ns);
+        self.look_for_files(now_ns);
         self.progress.show(now_ns, &self.stages);
         self.tell_manager();
         Ok(())

@@ -1,6 +1,6 @@
 //! Events of all processes on stderr, one line each. The hot path logs nothing.
 
-use std::io;
+use std::io::{self, Write};
 
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::Writer;
@@ -27,11 +27,21 @@ pub fn install(default_level: &str) {
         .with_ansi(false)
         .with_target(false)
         .with_timer(HostTime)
-        // It would say on stderr that stderr is gone, and end a process whose terminal closed.
+        // A line that cannot be written (stderr is a file on a full disk) would be complained of on stderr, which panics.
         .log_internal_errors(false)
         .finish();
     // Only tests install twice; the first stays.
     let _ = tracing::subscriber::set_global_default(subscriber);
+}
+
+/// The same for a stage, whose successor waits: the message in one line, and no time spent on a trace of calls. The core file
+/// has that.
+pub fn abort_at_once_on_panic() {
+    std::panic::set_hook(Box::new(|info| {
+        // Not to be written is no reason to panic again.
+        let _ = writeln!(io::stderr(), "{info}");
+        std::process::abort();
+    }));
 }
 
 /// Makes a panic end the process at once, with its message as an event: a half-dead stage helps nobody.

@@ -1,0 +1,137 @@
+//! Faults from outside: disks, deleted files, everything killed, other programs, and commands that make no sense.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use support::{Run, encke, text};
+
+fn stop(run: &Run) {
+    let stop = encke().args(["ctl", "stop", "--instance", &run.instance]).status().unwrap();
+    assert!(stop.success());
+}
+
+/// What an injection is refused with, as for a chain that cannot start: exit code 2.
+fn refused(args: &[&str]) -> String {
+    let output = encke().arg("inject").args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {}", text(&output.stderr));
+    text(&output.stderr)
+}
+
+#[test]
+fn every_fault_has_its_line_of_help_and_what_cannot_be_is_refused_with_what_can() {
+    let help = text(&encke().args(["inject", "--help"]).output().unwrap().stdout);
+    let said = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    for entry in faults::CATALOGUE {
+        assert!(said.contains(&format!("- {}: {}", entry.name, entry.help)), "{}", entry.name);
+    }
+    assert!(refused(&["joy"]).contains("giant-cluster"), "the words that there are");
+    assert!(refused(&["panic"]).contains("panic hits a stage: name one"));
+    assert!(refused(&["dust", "recorder"]).contains("dust hits the source"));
+    assert!(refused(&["cpu-hog", "source"]).contains("cpu-hog hits the machine: no name"));
+    assert!(refused(&["dust", "--by", "4"]).contains("level is 4, must be 1 to 3"));
+    assert!(refused(&["slow", "source", "--by", "5"]).contains("--by 5"));
+    assert!(refused(&["kill", "source", "--for", "1s"]).contains("kill does not last for a time"));
+    assert!(refused(&["stop", "source", "--times", "2"]).contains("stop is not had a number of times"));
+
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(2);
+    let refused = |args: &[&str]| refused(&[args, &["--instance", &run.instance]].concat());
+    assert!(refused(&["kill", "telescope"]).contains("no stage \"telescope\"; there are source, clusterer"));
+    assert!(refused(&["disk-full", "clusterer"]).contains("disk-full cannot hit \"clusterer\"; it can hit recorder"));
+    assert!(
+        refused(&["config-corruption", "source"]).contains("it can hit classifier, clusterer, extractor"),
+        "who has parameters"
+    );
+    stop(&run);
+    run.collect(child).expect_code(0);
+}
+
+#[test]
+fn a_full_disk_costs_the_recorder_its_file_and_the_chain_nothing() {
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    let before = run.status().unwrap();
+    run.inject(&["disk-full", "--for", "1s"]);
+    run.wait_for_more(5);
+    let now = run.status().unwrap();
+    for place in 0..5 {
+        assert_eq!(now["stages"][place]["pid"], before["stages"][place]["pid"]);
+    }
+    stop(&run);
+    let run = run.collect(child);
+    assert!(run.is_closed(), "{}", run.stdout());
+    assert!(!run.detections.is_empty(), "what was written before stays, whole");
+    assert!(run.stderr().contains("d.jsonl"), "{}", run.stderr());
+    assert!(run.sweeps().windows(2).all(|pair| pair[0] < pair[1]));
+}
+
+#[test]
+fn all_processes_killed_in_any_order_leave_nothing_that_hinders_the_next_start() {
+    for seed in ["1", "2", "3"] {
+        let run = Run::new(&["--duration", "forever"]);
+        let mut child = run.start();
+        run.wait_for_sweeps(2);
+        run.inject(&["kill-all", "--seed", seed]);
+        child.wait().unwrap();
+        let again = Run::new(&["--sweeps", "3", "--pace", "fast"]).finish().expect_code(0);
+        assert_eq!(again.sweeps().len(), 3);
+        assert!(support::leftovers(&run.instance).is_empty());
+    }
+}
+
+#[test]
+fn deleted_shared_memory_is_noticed_and_the_chain_stops_in_order() {
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    let deleted_ns = runtime::clock::now_ns();
+    run.inject(&["shared-memory-gone"]);
+    let run = run.collect(child).expect_code(1);
+    let took_s = (runtime::clock::now_ns() - deleted_ns) as f64 / 1e9;
+    println!("noticed, and stopped in order, after {took_s:.1} s");
+    assert!(run.is_closed(), "{}", run.stdout());
+    assert!(run.stderr().contains("files of the chain in shared memory were deleted"), "{}", run.stderr());
+    Run::new(&["--sweeps", "3", "--pace", "fast"]).finish().expect_code(0);
+}
+
+#[test]
+fn programs_that_take_cores_memory_and_disk_end_with_their_time_and_the_ledger_closes() {
+    let run = Run::new(&["--duration", "forever", "--from", "config/scenes/single.toml"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    for (hog, workers) in [("cpu-hog", "3"), ("memory-hog", "1"), ("io-hog", "1")] {
+        let output = encke().args(["inject", hog, "--for", "500ms", "--workers", workers]).output().unwrap();
+        assert!(output.status.success(), "{hog}: {}", text(&output.stderr));
+        run.wait_for_more(2);
+    }
+    stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    run.expect_every_sweep_accounted_for();
+}
+
+#[test]
+fn a_hog_ends_with_whoever_started_it() {
+    let mut hog = encke().args(["inject", "cpu-hog", "--for", "60s"]).spawn().unwrap();
+    let children = format!("/proc/{0}/task/{0}/children", hog.id());
+    let worker = loop {
+        let found = std::fs::read_to_string(&children).unwrap();
+        // It must have come so far as to ask for the signal.
+        let Some(worker) = found.split_whitespace().next().map(str::to_owned) else { continue };
+        let line = std::fs::read(format!("/proc/{worker}/cmdline")).unwrap_or_default();
+        let stat = std::fs::read_to_string(format!("/proc/{worker}/stat")).unwrap_or_default();
+        let cpu_ticks: u64 = stat.split(' ').nth(13).and_then(|ticks| ticks.parse().ok()).unwrap_or(0);
+        if text(&line).contains("--as-worker") && cpu_ticks > 5 {
+            break worker;
+        }
+    };
+    hog.kill().unwrap();
+    hog.wait().unwrap();
+    let stat = format!("/proc/{worker}/stat");
+    let is_gone =
+        || std::fs::read_to_string(&stat).is_ok_and(|stat| stat.contains(") Z ")) || !std::fs::exists(&stat).unwrap();
+    assert!(runtime::clock::wait_for(5_000_000_000, is_gone), "the worker outlived its starter");
+}
