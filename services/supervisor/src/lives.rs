@@ -48,7 +48,7 @@ impl Lives {
         Restarts::new(RestartBudget { restarts: LOWER_LIVES - 1, window_s: budget.window_s })
     }
 
-    /// Goes on where another supervisor stood.
+    /// Goes on at a tier, where one supervisor follows another.
     pub(crate) fn take_over(&mut self, tier: Tier) {
         self.tier = tier;
     }

@@ -106,10 +106,19 @@ impl Modes {
         }
     }
 
-    /// Goes on where another supervisor stood: with what the source is told already.
-    pub(crate) fn take_over(&mut self, ladder: Step, safe: bool, paused: bool) {
-        (self.ladder, self.safe, self.paused) = (ladder, safe, paused);
-        self.mode = self.wished();
+    /// Goes on in `mode`, where one supervisor follows another; the source is at `step`. The share of the step that is the
+    /// ladder's: safe mode explains `clusters-only`, and without a sensor's time there is no ladder.
+    ///
+    /// Whether it was safe mode behind a pause is not known: then the step tells.
+    pub(crate) fn take_over(&mut self, mode: Mode, step: Step) -> Step {
+        self.mode = mode;
+        self.paused = mode == Mode::Paused;
+        self.safe = mode == Mode::Safe || (self.paused && step >= Step::ClustersOnly);
+        if self.safe && step <= Step::ClustersOnly {
+            return Step::Nominal;
+        }
+        *(if self.paced { &mut self.ladder } else { &mut self.floor }) = step;
+        self.ladder
     }
 
     /// The mode that was asked for last.
@@ -290,6 +299,26 @@ mod tests {
         assert_eq!(sut.look(seen(300, 2, Step::Nominal)), Some(Passed::Entered(Mode::Nominal, 150 * MS)));
         assert!(!sut.is_changing());
         assert_eq!((sut.report.changes, sut.report.late), (1, 0));
+    }
+
+    #[test]
+    fn one_supervisor_follows_another_in_the_same_mode_at_the_same_step() {
+        for (mode, step, ladder) in [
+            (Mode::Nominal, Step::Nominal, Step::Nominal),
+            (Mode::Degraded, Step::PaperFeatures, Step::PaperFeatures),
+            (Mode::Safe, Step::ClustersOnly, Step::Nominal),
+            (Mode::Safe, Step::EverySecondSweep, Step::EverySecondSweep),
+            (Mode::Paused, Step::FewerStarts, Step::FewerStarts),
+            (Mode::Paused, Step::ClustersOnly, Step::Nominal),
+        ] {
+            let mut sut = Modes::new(1, true);
+            assert_eq!(sut.take_over(mode, step), ladder, "{mode:?}");
+            assert_eq!((sut.mode(), sut.step()), (mode, step));
+            assert!(!sut.wish(Wish::Ladder(ladder), Seen::default()), "no change of mode");
+        }
+        let mut sut = Modes::new(1, false);
+        assert_eq!(sut.take_over(Mode::Degraded, Step::FewerStarts), Step::Nominal);
+        assert_eq!(sut.step(), Step::FewerStarts);
     }
 
     /// What was wished, in any order, never leaves the modes in a state that its parts contradict.

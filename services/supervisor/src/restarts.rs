@@ -2,9 +2,9 @@
 
 use chain::executive::Action;
 use events::{CHAIN, EventId};
-use runtime::clock;
 use runtime::page::Tier;
 use runtime::realtime::AsBefore;
+use runtime::{TAPE, clock};
 
 use crate::SupervisorError;
 use crate::child::Ended;
@@ -23,13 +23,16 @@ impl Watch<'_> {
     /// # Errors
     /// A process cannot be started.
     #[allow(dead_code, reason = "the engine that gives orders calls it")]
-    pub(crate) fn obey(&mut self, order: Order) -> Result<(), SupervisorError> {
-        let Order { action, stage, reason } = order;
-        let reason = reason.as_str();
-        match (action, stage) {
+    pub(crate) fn obey(&mut self, order: &Order) -> Result<(), SupervisorError> {
+        let reason = order.reason.as_str();
+        match (order.action, order.stage) {
             (Action::Event, _) | (Action::RestartStage, None) => Ok(()),
             (Action::Degrade, _) => {
                 self.step_down(reason);
+                Ok(())
+            }
+            (Action::RestartStage, Some(position)) if position >= self.stages.len() => {
+                self.restart_tape(reason);
                 Ok(())
             }
             (Action::RestartStage, Some(position)) => self.restart_stage(position, By::Executive, reason),
@@ -63,6 +66,16 @@ impl Watch<'_> {
             return self.start_again(position);
         }
         Ok(())
+    }
+
+    /// Ends the tape's process; whoever looks after it starts the next within its budget.
+    fn restart_tape(&mut self, reason: &str) {
+        let Some(tape) = self.tape.as_ref().filter(|tape| tape.process.is_alive() && !tape.process.told) else {
+            return;
+        };
+        tape.process.kill();
+        tracing::warn!(stage = TAPE, reason, "killed, to be started anew");
+        self.say(EventId::StageKilled, TAPE, reason);
     }
 
     /// Ends all processes of the chain and starts them again, within the budget where the table asks for it.

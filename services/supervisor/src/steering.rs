@@ -3,6 +3,7 @@
 use chain::Mode;
 use events::{CHAIN, EventId};
 use messages::Step;
+use runtime::page::Tier;
 use runtime::{Pace, clock};
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,25 @@ impl Watch<'_> {
         let source = &self.stages[0].page;
         source.step.set(self.modes.step() as u64);
         source.pause.set(u64::from(self.modes.is_paused()));
+    }
+
+    /// Goes on in the mode, and with the tiers, that the pages say, where one supervisor follows another. The step at which the
+    /// ladder stands.
+    #[allow(dead_code, reason = "called where a chain is adopted")]
+    pub(crate) fn take_over_modes(&mut self) -> Step {
+        let (mode, step) = (Mode::from_number(self.page.mode.get()), self.stages[0].page.step.get());
+        self.ladder_stood = self.modes.take_over(mode, Step::from_number(step as u32));
+        self.modes.report.changes = self.page.mode_changes.get();
+        self.modes.report.late = self.page.modes_late.get();
+        self.refusals.take_over(self.page.commands_refused.get());
+        for (lives, stage) in self.lives.iter_mut().zip(&self.stages) {
+            lives.take_over(Tier::from_number(stage.page.tier.get()));
+        }
+        if let Some(stage) = self.stages.iter().find(|stage| stage.page.tier.get() > 0) {
+            let reason = format!("stage {:?} could not be kept running under the supervisor before", stage.name);
+            self.safe_entered = Some(SafeReport { by: By::Executive, reason, sweep: self.sweeps_sent() });
+        }
+        self.ladder_stood
     }
 
     fn seen(&self) -> Seen {

@@ -174,8 +174,7 @@ impl Source for Live {
         if let Some(intake) = self.intake() {
             intake.discard();
         }
-        self.sweeps.flush(&mut self.gathered);
-        self.gathered.clear();
+        self.sweeps.discard(&mut self.gathered);
     }
 
     fn is_live(&self) -> bool {

@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use lidar::{Column, MAX_COLUMNS, Return, SensorModel};
-use messages::Sweep;
+use messages::{Message, Sweep};
 
 use super::cycles::{Cycle, Cycles, Step};
 use super::packet::{CHANNELS, TURN_CDEG};
@@ -181,6 +181,13 @@ impl Sweeps {
         self.end(open, false, sweep);
         self.cycles.interrupt();
         true
+    }
+
+    /// Drops the sweep that is being gathered, and the packets at hand.
+    pub(crate) fn discard(&mut self, sweep: &mut Sweep) {
+        self.flush(sweep);
+        sweep.clear();
+        self.cycles.discard();
     }
 
     fn begin(&mut self, first: Cycle, sweep: &mut Sweep) -> Open {

@@ -158,6 +158,12 @@ impl Cycles {
         self.is_edge = false;
     }
 
+    /// The same, and also forgets a packet that was looked ahead at.
+    pub(crate) fn discard(&mut self) {
+        self.interrupt();
+        self.ahead_arrival = None;
+    }
+
     /// Where the packets come from.
     pub(crate) fn capture(&mut self) -> &mut Capture {
         &mut self.capture
