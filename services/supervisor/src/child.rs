@@ -45,8 +45,8 @@ pub(crate) struct Watched {
 enum Process {
     /// It started it.
     Child(Child),
-    /// The supervisor before it did.
-    Adopted { pid: Pid, handle: OwnedFd },
+    /// The supervisor before it did. No handle where the kernel, or a sandbox, gives none.
+    Adopted { pid: Pid, handle: Option<OwnedFd> },
     /// It died while nobody looked after it; that is still to be told.
     Departed,
 }
@@ -82,7 +82,7 @@ impl Watched {
             // One that has not taken its page yet stands nowhere but in the list of processes.
             let is_it = |pid: &Pid| !has_lived || pid.as_raw_nonzero().get() as u64 == on_page;
             let pids = living.iter().filter(|(stage, _)| stage == name).map(|(_, pid)| *pid).filter(is_it);
-            let handles = pids.filter_map(|pid| Some((pid, pidfd_open(pid, PidfdFlags::empty()).ok()?)));
+            let handles = pids.map(|pid| (pid, pidfd_open(pid, PidfdFlags::empty()).ok()));
             // The number may have been used again before there was a handle.
             let mut handles = handles.filter(|(pid, _)| stage_of(*pid, instance).is_some());
             adopted.process = match handles.next() {
@@ -156,7 +156,7 @@ impl Watched {
     /// Whether its process has ended since the last look, and how.
     pub(crate) fn look(&mut self) -> Option<Ended> {
         if self.ours {
-            let ended = self.process.as_mut()?.ended()?;
+            let ended = self.process.as_mut()?.ended(&self.instance)?;
             self.process = None;
             return Some(ended);
         }
@@ -181,7 +181,7 @@ impl Watched {
 
     fn signal(&self, signal: Signal) {
         // It may have gone a moment ago.
-        if let Some(Process::Adopted { handle, .. }) = &self.process {
+        if let Some(Process::Adopted { handle: Some(handle), .. }) = &self.process {
             let _ = pidfd_send_signal(handle, signal);
         } else if let Some(pid) = self.pid() {
             let _ = kill_process(pid, signal);
@@ -191,7 +191,7 @@ impl Watched {
 
 impl Process {
     /// How it ended, if it did.
-    fn ended(&mut self) -> Option<Ended> {
+    fn ended(&mut self, instance: &Instance) -> Option<Ended> {
         use std::os::unix::process::ExitStatusExt;
         match self {
             Self::Child(child) => {
@@ -202,7 +202,8 @@ impl Process {
                     (None, None) => Ended::Gone,
                 })
             }
-            Self::Adopted { handle, .. } => {
+            Self::Adopted { pid, handle: None } => stage_of(*pid, instance).is_none().then_some(Ended::Gone),
+            Self::Adopted { handle: Some(handle), .. } => {
                 // Also when whoever is its parent now never waits for it.
                 let mut handles = [PollFd::new(handle, PollFlags::IN)];
                 let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
