@@ -5,6 +5,8 @@ use std::fmt::{Display, Formatter, Result};
 pub(crate) enum Evidence {
     /// Its process has ended: which one, counted from 1.
     Ended { process: u64 },
+    /// Not connected for this long after it was started [ns].
+    NotUp { for_ns: u64 },
     /// No progress for this long, and stopped by a signal [ns].
     Stopped { age_ns: u64 },
     /// No progress for this long, and no computing [ns].
@@ -28,6 +30,7 @@ impl Display for Evidence {
         let ms = |ns: &u64| ns / 1_000_000;
         match self {
             Self::Ended { process } => write!(f, "process {process} of it has ended"),
+            Self::NotUp { for_ns } => write!(f, "not connected {} ms after it was started", ms(for_ns)),
             Self::Stopped { age_ns } => write!(f, "no progress for {} ms: stopped by a signal", ms(age_ns)),
             Self::Still { age_ns } => write!(f, "no progress for {} ms, and it computes nothing", ms(age_ns)),
             Self::Computes { age_ns, cpu_ns } => {

@@ -12,6 +12,8 @@ use super::waiting::Waiting;
 
 /// How long a stage that was found slow within a part counts as slow [sweeps].
 const SLOW_SWEEPS: u64 = 10;
+/// How long a process may take to come up [ns].
+const START_NS: u64 = 10_000_000_000;
 
 /// What is the matter with a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +39,8 @@ pub(crate) struct Patient {
     ailment: Option<Ailment>,
     was_up: bool,
     processes: u64,
+    /// Since when its present process has been coming up [ns].
+    starts_ns: Option<u64>,
     life: u64,
     pulse: Pulse,
     waiting: Waiting,
@@ -80,10 +84,16 @@ impl Patient {
     fn absent(&mut self, now_ns: u64, signs: &Signs) -> Option<Change> {
         let died = self.was_up || (self.processes > 0 && signs.processes > self.processes);
         let process = if self.was_up { signs.processes.min(self.processes) } else { self.processes };
+        if died || !signs.starts {
+            self.starts_ns = None;
+        }
         self.was_up = false;
         self.processes = signs.processes;
-        let is_dead = self.ailment.is_some_and(|ailment| ailment.condition == Condition::Dead);
-        if is_dead || !died {
+        let for_ns = signs.starts.then(|| now_ns.saturating_sub(*self.starts_ns.get_or_insert(now_ns)));
+        if let Some(for_ns) = for_ns.filter(|for_ns| *for_ns >= START_NS) {
+            return self.note(now_ns, Some((Condition::Hung, Evidence::NotUp { for_ns })));
+        }
+        if !died {
             return None;
         }
         self.note(now_ns, Some((Condition::Dead, Evidence::Ended { process })))

@@ -11,6 +11,8 @@ use crate::child::Watched;
 pub(crate) struct Signs {
     /// It is connected and was not told to leave. Only such a process is judged.
     pub(crate) up: bool,
+    /// It lives, and is not connected.
+    pub(crate) starts: bool,
     /// It was told to leave: whatever it does now is said of nobody.
     pub(crate) told: bool,
     /// Processes that it has been so far.
@@ -49,6 +51,7 @@ impl Signs {
         let pid = if is_old { watched.pid().map(|pid| pid.as_raw_nonzero().get() as u32) } else { None };
         Self {
             up,
+            starts: !up && watched.is_alive(),
             told: watched.told,
             processes: watched.pids.len() as u64,
             life: page.incarnation.get(),

@@ -315,6 +315,22 @@ fn a_death_at_start_up_is_said_too_and_once_however_many_follow() {
 }
 
 #[test]
+fn a_process_that_does_not_come_up_is_hung_after_ten_seconds_and_so_is_its_successor() {
+    let mut bed = Bed::stage();
+    bed.work(500);
+    bed.signs = Signs { up: false, starts: true, processes: 2, ..bed.signs };
+    bed.pass(9_990, |_, _| ());
+    assert_eq!(bed.said(), [Condition::Dead]);
+    bed.pass(20, |_, _| ());
+    assert_eq!(bed.said(), [Condition::Dead, Condition::Hung]);
+    bed.signs.processes = 3;
+    bed.pass(9_990, |_, _| ());
+    assert_eq!(bed.said(), [Condition::Dead, Condition::Hung, Condition::Dead], "it was ended");
+    bed.pass(20, |_, _| ());
+    assert_eq!(bed.said()[3..], [Condition::Hung]);
+}
+
+#[test]
 fn one_condition_at_a_time_is_said_and_the_gravest() {
     let mut bed = Bed::stage();
     bed.work(500);
