@@ -45,6 +45,8 @@ pub struct RunFigures {
     pub steps: BTreeMap<String, u64>,
     /// The processes.
     pub processes: Option<Vec<Process>>,
+    /// How often what happened, by name; `unsaid` and `unwritten` beside.
+    pub events: BTreeMap<String, u64>,
     /// Who had the cores.
     pub machine_load: MachineLoad,
     /// How late a thread wakes.

@@ -31,6 +31,9 @@ struct Log {
     message: String,
     #[prost(string, tag = "4")]
     name: String,
+    /// The event's word.
+    #[prost(string, tag = "5")]
+    file: String,
 }
 
 /// What has been read so far.
@@ -47,6 +50,8 @@ struct Reading {
     tie: Option<(u64, u64)>,
     events: Vec<(u64, Log)>,
     event_count: u64,
+    /// By word.
+    counts: BTreeMap<String, u64>,
     stages: Vec<StageCount>,
 }
 
@@ -64,6 +69,7 @@ pub(crate) fn read(mut input: impl Read, file: String) -> Result<RunFigures, Run
         tie: None,
         events: Vec::new(),
         event_count: 0,
+        counts: BTreeMap::new(),
         stages: Vec::new(),
     };
     let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_record_length_limit(MOST_BYTES);
@@ -109,14 +115,32 @@ impl Reading {
             SWEEPS => self.sweep(utc_ns, data),
             STATUS => self.status(data),
             EVENTS => {
-                self.event_count += 1;
-                if let Some(log) = Log::decode(data).ok().filter(|_| self.events.len() < MOST_EVENTS) {
-                    self.events.push((utc_ns, log));
+                if let Ok(log) = Log::decode(data) {
+                    self.event(utc_ns, log);
                 }
             }
             _ => {}
         }
         *self.messages.entry(topic).or_default() += 1;
+    }
+
+    /// Counts an event by its word; restarts and steps are kept for the timeline. Recordings of earlier versions have no
+    /// words, only what is kept, with its kind for a name.
+    fn event(&mut self, utc_ns: u64, mut log: Log) {
+        if !log.file.is_empty() {
+            if self.counts.len() < MOST_EVENTS || self.counts.contains_key(&log.file) {
+                *self.counts.entry(log.file.clone()).or_default() += 1;
+            }
+            match log.file.as_str() {
+                "stage_restarted" => log.message = std::mem::replace(&mut log.name, "restart".to_owned()),
+                "step_taken" | "step_returned" => log.name = "step".to_owned(),
+                _ => return,
+            }
+        }
+        self.event_count += 1;
+        if self.events.len() < MOST_EVENTS {
+            self.events.push((utc_ns, log));
+        }
     }
 
     fn sweep(&mut self, utc_ns: u64, data: &[u8]) {
@@ -161,6 +185,7 @@ impl Reading {
             let t_s = (host_ns - i128::from(begin_ns)) as f64 / 1e9;
             Event { t_s, kind: log.name, what: log.message }
         };
+        figures.events = self.counts;
         if let Some(timeline) = &mut figures.timeline {
             timeline.events = self.events.into_iter().map(event).collect();
             timeline.event_count = self.event_count;

@@ -57,8 +57,24 @@ fn row(place: usize, process: &Process) -> String {
     )
 }
 
-/// What happened, with the numbers that stand above the plots.
+/// What happened: restarts and steps with the numbers that stand above the plots, then everything by name.
 pub(crate) fn events(figures: &RunFigures) -> String {
+    timeline(figures) + &by_name(figures)
+}
+
+fn by_name(figures: &RunFigures) -> String {
+    let rows = figures.events.iter().filter(|(_, times)| **times > 0);
+    let row = |(name, times): (&String, &u64)| {
+        format!("<tr><td>{}</td><td class=\"n\">{}</td></tr>", escaped(name), count(*times))
+    };
+    let rows: String = rows.map(row).collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    format!("<table><tr><th>event</th><th class=\"n\">times</th></tr>{rows}</table>")
+}
+
+fn timeline(figures: &RunFigures) -> String {
     let heading = "<h2>Events</h2>".to_owned();
     let Some(timeline) = &figures.timeline else {
         return heading + &absent("This report is of an older version: it has no list of events.");

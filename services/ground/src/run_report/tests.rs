@@ -307,6 +307,9 @@ fn recorded(sweeps: &[Vec<u8>], pace: &str) -> Vec<u8> {
     let status = json!({"stages": [{"stage": "clusterer", "pid": 1, "received": 77, "published": 76, "restarts": 2}]});
     write(1, 4, status.to_string().as_bytes());
     write(2, 5, b"\x1a\x09said this\x22\x07restart");
+    // As the log's events are recorded: who, what word, what number.
+    write(2, 6, b"\x1a\x08signal 9\x22\x09clusterer\x2a\x0astage_died\x30\x07");
+    write(2, 7, b"\x1a\x09restart 1\x22\x09clusterer\x2a\x0fstage_restarted\x30\x08");
     writer.finish().unwrap();
     writer.into_inner().into_inner()
 }
@@ -336,6 +339,9 @@ fn a_recording_says_what_its_traces_and_detections_say() {
     // The first answer came 110 ms after the first firing; the event half a second after it.
     assert_eq!(timeline.events[0].kind, "restart");
     assert!((timeline.events[0].t_s - 0.61).abs() < 1e-6);
+    assert_eq!((timeline.events[1].kind.as_str(), timeline.events[1].what.as_str()), ("restart", "clusterer"));
+    assert_eq!((timeline.events.len(), found.events["stage_died"], found.events["stage_restarted"]), (2, 1, 1));
+    expect(&found.to_html(), &["<td>stage_died</td><td class=\"n\">1</td>"]);
     let recording = found.read_from.as_ref().unwrap();
     let [first, last] = recording.written_utc.clone().unwrap();
     assert_eq!((first.as_str(), last.as_str()), ("2026-11-22 12:00:00", "2026-11-22 12:00:00"));
