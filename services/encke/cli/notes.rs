@@ -62,24 +62,18 @@ Examples:
   encke doctor
   encke doctor --chain config/chain.toml --json    also what chain.toml asks for and would be refused";
 
-pub(super) const CTL_EXAMPLES: &str =
-    "Commands are taken of the chain's own user alone, 50 a second at most. Exit 1: the chain refused, and said why.
+pub(super) const INJECT_EXAMPLES: &str = "\
+slow and slow-times last to the end of the run where --for names no time; slow --by 0ms ends slow. Faults that a stage
+has itself are counted down by it (--times); the others are over when the command returns.
+Exit codes: 0 done, 1 the process is not there, 2 the chain, the stage or the fault cannot be had like that.
+
 Examples:
-  encke ctl status --json
-  encke ctl pause                      then resume
-  encke ctl safe                       resume leads out of it, and of degrade
-  encke ctl restart extractor
-  encke ctl reload                     reads the chain's parameters and executive.toml again
-  encke ctl stop --instance flight-1";
-
-pub(super) const INJECT_EXAMPLES: &str = "Faults:
-  kill     SIGKILL to the stage's process
-  stop     SIGSTOP, and SIGCONT after --for (500 ms)
-  slow     make its work on each sweep longer by --by (20 ms); --by 0ms ends it
-  swallow  let it lose one part and say nothing: the ledger must come out OPEN
-
-Example:
-  encke inject stop clusterer --for 500ms";
+  encke inject kill classifier
+  encke inject stop clusterer --for 500ms
+  encke inject panic extractor --times 3
+  encke inject dust --level 3 --times 50 --seed 7
+  encke inject clock-step --by=-1h
+  encke inject cpu-hog --workers 2 --for 10s";
 
 pub(super) const SOAK_NOTES: &str = "\
 The chain runs as a process of its own and is looked at from outside. --faults names a campaign: a list of faults, or one of the
