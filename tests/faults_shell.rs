@@ -26,7 +26,7 @@ struct Endless {
 impl Endless {
     /// With some lines of chain.toml changed; stages may die as often as they like.
     fn start(changes: &[(&str, &str)]) -> Self {
-        let endless = ("restarts = 10", "restarts = 100000");
+        let endless = ("restarts = 10", "restarts = 1000");
         let (config, chain) = chain_with(&[&[endless], changes].concat());
         let run = Run::new(&["--duration", "forever", "--chain", &chain]);
         let child = run.start();

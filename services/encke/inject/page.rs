@@ -20,9 +20,11 @@ impl Injection {
         let Some(number) = self.planned.fault.page_number() else {
             return Err(Failure::run(format!("{} is not asked for on a page", self.planned.fault.name())));
         };
-        let times = match (self.planned.fault, self.planned.for_s) {
-            (Fault::EventStorm, for_s) => (for_s.unwrap_or(1.0) * STORM_PER_S as f64) as u64,
-            _ => self.planned.times.unwrap_or(FOR_EVER),
+        let times = match self.planned.fault {
+            Fault::EventStorm => (self.planned.for_s.unwrap_or(1.0) * STORM_PER_S as f64) as u64,
+            // Until it is taken back.
+            Fault::SlowTimes => FOR_EVER,
+            _ => self.planned.times.unwrap_or(1),
         };
         page.ask_for(Asked { number, by: self.by() as i32, seed: self.planned.seed as u32, times });
         if self.planned.fault == Fault::SlowTimes && self.planned.for_s.is_some() {
