@@ -90,7 +90,10 @@ impl Watch<'_> {
         let is_new = !self.modes.is_safe();
         self.wish(Wish::Safe);
         if is_new {
-            tracing::error!(reason, "safe mode");
+            // Whoever commands it knows; and a terminal that nobody reads must not fill up.
+            if by == By::Executive {
+                tracing::error!(reason, "safe mode");
+            }
             self.say(EventId::SafeEntered, CHAIN, reason);
         }
         let first_by_executive = self.safe_entered.as_ref().is_none_or(|safe| safe.by < by);
