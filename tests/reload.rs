@@ -9,14 +9,20 @@ use std::collections::BTreeMap;
 
 use runtime::Plan;
 use runtime::page::PageMap;
-use support::{Finished, Run};
+use support::{Finished, LADDER, NO_LADDER, Run};
 use transport::Instance;
 
 const SWEEPS: &str = "120";
 const FROM_SWEEP: u64 = 60;
 const BOX: [&str; 6] = ["--from", "config/scenes/box.toml", "--sweeps", SWEEPS, "--pace", "fast"];
-/// The line that is changed, and what it becomes: no cluster is large enough to be classified.
+/// The line that is changed, and what it becomes: no cluster is large enough for the paper's features.
 const CHANGE: (&str, &str) = ("min_points = 5", "min_points = 100000");
+/// What a chain needs to do everything at real time too, however late.
+const PATIENT: [(&str, &str); 3] = [
+    (LADDER, NO_LADDER),
+    ("queue_sweeps = 4", "queue_sweeps = 40"),
+    ("allowed_age_ms = 1000.0", "allowed_age_ms = 60000.0"),
+];
 
 /// The pages of a running chain, by stage.
 fn pages(run: &Run) -> BTreeMap<String, PageMap> {
@@ -56,18 +62,22 @@ fn reloaded(change: (&str, &str), then: impl FnOnce(&Run)) -> (Finished, BTreeMa
     (run.collect(child).expect_code(0), pages)
 }
 
-/// A run with the changed parameters from its first sweep on.
-fn changed() -> Finished {
-    let (dir, chain) = support::chain_with(&[]);
-    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/config/stages/clusterer.toml")).unwrap();
-    std::fs::create_dir(dir.path().join("stages")).unwrap();
-    std::fs::write(dir.path().join("stages/clusterer.toml"), text.replace(CHANGE.0, CHANGE.1)).unwrap();
-    Run::new(&[&BOX[..], &["--chain", &chain]].concat()).finish().expect_code(0)
+/// A run to its end with these lines of chain.toml, and one with the changed parameters from its first sweep on.
+fn plain_and_changed(args: &[&str], lines: &[(&str, &str)]) -> [Finished; 2] {
+    [false, true].map(|is_changed| {
+        let (dir, chain) = support::chain_with(lines);
+        let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/config/stages/clusterer.toml");
+        let text = std::fs::read_to_string(shipped).unwrap();
+        std::fs::create_dir(dir.path().join("stages")).unwrap();
+        let text = if is_changed { text.replace(CHANGE.0, CHANGE.1) } else { text };
+        std::fs::write(dir.path().join("stages/clusterer.toml"), text).unwrap();
+        Run::new(&[args, &["--chain", &chain]].concat()).finish().expect_code(0)
+    })
 }
 
 #[test]
 fn new_parameters_count_from_the_sweep_named_on_whatever_dies_on_the_way() {
-    let (plain, changed) = (Run::new(&BOX).finish().expect_code(0), changed());
+    let [plain, changed] = plain_and_changed(&BOX, &[]);
     let border = FROM_SWEEP as usize;
     assert_ne!(plain.detections[border..], changed.detections[border..]);
     let expected = [&plain.detections[..border], &changed.detections[border..]].concat();
@@ -96,22 +106,22 @@ fn parameters_that_do_not_hold_change_nothing() {
 }
 
 #[test]
-fn at_the_sensors_pace_no_sweep_is_missed() {
-    let run = Run::new(&["--from", "config/scenes/box.toml", "--sweeps", "40"]);
+fn at_the_sensors_pace_no_sweep_is_missed_and_the_bytes_are_the_same() {
+    let scene = ["--from", "config/scenes/single.toml", "--sweeps", "40"];
+    let [plain, changed] = plain_and_changed(&[&scene[..], &["--pace", "fast"]].concat(), &PATIENT);
+    let (_dir, chain) = support::chain_with(&PATIENT);
+    let run = Run::new(&[&scene[..], &["--chain", &chain]].concat());
     let child = run.start();
     run.wait_for_sweeps(5);
-    let sweep = pages(&run)["source"].next_ordinal_out.get() / 36;
-    reload(&run, sweep + 3, CHANGE);
+    let border = pages(&run)["source"].next_ordinal_out.get() / 36 + 3;
+    reload(&run, border, CHANGE);
     let pages = pages(&run);
     let run = run.collect(child).expect_code(0);
     assert_eq!((run.sweeps().len(), run.missing()), (40, 0), "{}", run.stdout());
     for (stage, page) in &pages {
         assert_eq!(page.table_active.get(), 1, "{stage}");
     }
-    let is_classified = |line: &serde_json::Value| {
-        line["detections"].as_array().unwrap().iter().any(|found| found["class"] != "unclassified")
-    };
-    let border = sweep as usize + 3;
-    assert!(run.detections[..border].iter().any(is_classified));
-    assert!(!run.detections[border..].iter().any(is_classified));
+    let border = border as usize;
+    assert_ne!(plain.detections[border..], changed.detections[border..]);
+    assert!(run.detections == [&plain.detections[..border], &changed.detections[border..]].concat());
 }

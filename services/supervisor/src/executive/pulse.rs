@@ -21,6 +21,8 @@ pub(crate) struct Pulse {
     first_cpu_ns: u64,
     /// When it was last seen to do something, and the CPU time and run-queue delay by then [ns]; none while it is not asked.
     moved: Option<(u64, u64)>,
+    /// When it was last found hung [ns]. Whoever is ended in that state runs once more.
+    hung: Option<(u64, Evidence)>,
 }
 
 impl Pulse {
@@ -36,13 +38,15 @@ impl Pulse {
         if age_ns < times.hung_ns {
             return None;
         }
-        if activity.stopped {
-            return Some((Condition::Hung, Evidence::Stopped { age_ns }));
-        }
         // Whoever waits for a disk may wait longer.
         let patience_ns = if activity.blocked { times.spinning_ns } else { times.hung_ns };
-        if age_ns >= patience_ns && still_ns >= times.asked_ns {
-            return Some((Condition::Hung, Evidence::Still { age_ns }));
+        if activity.stopped {
+            self.hung = Some((now_ns, Evidence::Stopped { age_ns }));
+        } else if age_ns >= patience_ns && still_ns >= times.asked_ns {
+            self.hung = Some((now_ns, Evidence::Still { age_ns }));
+        }
+        if let Some((_, evidence)) = self.hung.filter(|(last_ns, _)| now_ns - last_ns < times.asked_ns) {
+            return Some((Condition::Hung, evidence));
         }
         let cpu_ns = activity.cpu_ns.saturating_sub(self.first_cpu_ns);
         let computes = Evidence::Computes { age_ns, cpu_ns };
@@ -56,7 +60,7 @@ impl Pulse {
     fn moved_ns(&mut self, now_ns: u64, heartbeat_ns: u64, activity: Activity) -> u64 {
         let used_ns = activity.cpu_ns + activity.run_delay_ns;
         if self.heartbeat_ns != heartbeat_ns || self.moved.is_none() {
-            *self = Self { heartbeat_ns, first_cpu_ns: activity.cpu_ns, moved: Some((now_ns, used_ns)) };
+            *self = Self { heartbeat_ns, first_cpu_ns: activity.cpu_ns, moved: Some((now_ns, used_ns)), hung: None };
         }
         let moved = self.moved.get_or_insert((now_ns, used_ns));
         let least_ns = now_ns.saturating_sub(moved.0) / LEAST_SHARE + LEAST_NS;

@@ -92,6 +92,31 @@ fn a_stopped_stage_is_hung_within_two_sweeps_and_well_when_it_goes_on() {
 }
 
 #[test]
+fn a_stopped_stage_that_is_ended_is_not_well_in_between() {
+    let mut bed = Bed::stage();
+    bed.work(500);
+    bed.signs.activity = Some(Activity { stopped: true, ..still().unwrap() });
+    bed.pass(300, |_, _| ());
+    // It dies: that takes some time of a core.
+    bed.signs.activity = Some(Activity { runnable: true, cpu_ns: 90 * MS, ..still().unwrap() });
+    bed.pass(50, |_, _| ());
+    bed.signs = Signs { up: false, processes: 2, ..bed.signs };
+    bed.pass(50, |_, _| ());
+    assert_eq!(bed.said(), [Condition::Hung, Condition::Dead]);
+    assert_eq!(bed.said.len(), 2, "{:?}", bed.said);
+}
+
+#[test]
+fn a_stage_that_goes_on_with_its_part_is_not_hung_any_more() {
+    let mut bed = Bed::stage().fast();
+    bed.work(500);
+    bed.signs.activity = still();
+    bed.pass(400, |_, _| ());
+    bed.pass(400, |signs, _| signs.activity.as_mut().unwrap().cpu_ns += 5 * MS);
+    assert!(matches!(bed.said[1..], [(_, Change::Ended(Condition::Hung, _))]), "{:?}", bed.said);
+}
+
+#[test]
 fn a_stage_that_waits_for_what_never_comes_is_hung_within_two_sweeps() {
     let mut bed = Bed::stage();
     bed.work(500);
