@@ -205,7 +205,7 @@ fn restarts_by_command_count_against_no_budget() {
     let child = run.start();
     run.wait_for_sweeps(2);
     for restarts in 1..4 {
-        run.ctl(&[["restart", "extractor"].as_slice(), &["restart-chain"], &["restart", "source"]][restarts - 1]);
+        run.ctl([["restart", "extractor"].as_slice(), &["restart-chain"], &["restart", "source"]][restarts - 1]);
         run.wait_for_more(2);
     }
     let status = run.status().unwrap();
