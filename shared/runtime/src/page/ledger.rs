@@ -134,6 +134,19 @@ impl Page {
 
     /// Names and counts a gap that ends before `next_sequence`, so that a death on the way neither loses nor doubles it.
     fn count_gap(&self, gap: Gap, next_sequence: u64) {
+        self.gap_lost_unsettled.set(self.lost_unsettled.get());
+        self.gap_in_hand.set(0);
+        self.count_gap_as_journalled(gap, next_sequence);
+    }
+
+    /// The same for the gap of a sink that died: with it go the part in hand, and `unsettled` that it had accepted.
+    fn count_gap_of_sink(&self, gap: Gap, unsettled: u64) {
+        self.gap_lost_unsettled.set(self.lost_unsettled.get() + unsettled);
+        self.gap_in_hand.set(1);
+        self.count_gap_as_journalled(gap, self.next_sequence.get());
+    }
+
+    fn count_gap_as_journalled(&self, gap: Gap, next_sequence: u64) {
         let words = self.gap_words(self.gap_count.get());
         words.kind.set(gap.kind as u64);
         words.first_ordinal.set(gap.first_ordinal);
@@ -158,6 +171,10 @@ impl Page {
             }
         }
         self.next_sequence.set(self.gap_sequence.get());
+        self.lost_unsettled.set(self.gap_lost_unsettled.get());
+        if self.gap_in_hand.get() > 0 {
+            self.put_down();
+        }
         // A death between the two costs the gap its name, not its count.
         self.gap_pending.set(0);
         self.gap_count.set(number + 1);
@@ -232,14 +249,14 @@ impl Page {
             let accepted = self.published.get() > self.in_hand_published.get();
             let rejected = self.rejected_total() > self.in_hand_rejected.get();
             lost += u64::from(!accepted && !rejected);
-            self.put_down();
         }
         if lost > 0 {
             let end_ordinal = self.next_ordinal_in.get();
             let first_ordinal = self.next_ordinal_out.get().min(end_ordinal);
             let gap = Gap { kind: GapKind::Lost, first_ordinal, end_ordinal, parts: lost };
-            self.count_gap(gap, self.next_sequence.get());
-            self.lost_unsettled.add(unsettled);
+            self.count_gap_of_sink(gap, unsettled);
+        } else {
+            self.put_down();
         }
         Settlement { sent_uncounted: false, lost }
     }
@@ -406,6 +423,44 @@ mod tests {
             assert_eq!(page.settle_sink().lost, 0);
             assert_eq!(page.counted(), 3 + lost);
             assert_eq!(page.held(true), 0);
+        }
+    }
+
+    /// The settler may die too: what it journalled and did not finish is finished by the next.
+    #[test]
+    fn a_sinks_account_is_settled_once_whenever_the_settler_dies() {
+        // One part accepted and not written, one in hand.
+        let died = || {
+            let (dir, page) = page();
+            drop(page.take_in_hand(part(0), 0, false));
+            page.count_accepted(Verdict::Complete);
+            page.put_down();
+            drop(page.take_in_hand(part(1), 1, false));
+            (dir, page)
+        };
+        let gap = Gap { kind: GapKind::Lost, first_ordinal: 0, end_ordinal: 2, parts: 2 };
+        for upto in 0..=5 {
+            let (_dir, page) = died();
+            for step in 0..upto {
+                match step {
+                    0 => {
+                        // Journalled: the gap is pending and nothing of it counted.
+                        page.count_gap_of_sink(gap, 1);
+                        page.lost.set(0);
+                        page.lost_unsettled.set(0);
+                        page.in_hand.set(2);
+                        page.gap_count.set(0);
+                        page.gap_pending.set(1);
+                    }
+                    1 => page.lost.set(2),
+                    2 => page.lost_unsettled.set(1),
+                    3 => page.put_down(),
+                    _ => page.gap_pending.set(0),
+                }
+            }
+            page.settle_sink();
+            assert_eq!((page.lost.get(), page.held(true)), (2, 0), "after {upto} steps");
+            assert_eq!(page.settle_sink(), Settlement::default(), "settling twice adds nothing");
         }
     }
 

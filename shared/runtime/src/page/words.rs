@@ -204,6 +204,10 @@ pub struct Page {
     pub(super) gap_pending: Word,
     pub(super) gap_missing_before: Word,
     pub(super) gap_sequence: Word,
+    /// What `lost_unsettled` is once the gap is counted.
+    pub(super) gap_lost_unsettled: Word,
+    /// 1 where the part in hand is one of the gap.
+    pub(super) gap_in_hand: Word,
     pub(super) gap_count: Word,
     pub(super) gaps: [GapWords; MAX_GAPS],
 
