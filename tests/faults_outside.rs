@@ -98,6 +98,38 @@ fn deleted_shared_memory_is_noticed_and_the_chain_stops_in_order() {
 }
 
 #[test]
+fn damaged_parameters_and_models_are_refused_by_name_and_put_right_again() {
+    for (fault, stage, file) in
+        [("config-corruption", "clusterer", "clusterer.toml"), ("model-corruption", "classifier", "solids")]
+    {
+        let run = Run::new(&["--duration", "forever"]);
+        let mut child = run.start();
+        run.wait_for_sweeps(5);
+        let instance = transport::Instance::named(&run.instance).unwrap();
+        let before = runtime::Plan::read(&instance).unwrap();
+        run.inject(&[fault, stage, "--for", "300ms"]);
+        // Where less trusted parts stand in, the chain goes on; else it ends by itself.
+        for _ in 0..200 {
+            if child.try_wait().unwrap().is_some() {
+                break;
+            }
+            if let Ok(plan) = runtime::Plan::read(&instance) {
+                assert_eq!((&plan.parameters, &plan.config_dirs), (&before.parameters, &before.config_dirs), "{fault}");
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        if child.try_wait().unwrap().is_none() {
+            run.wait_for_more(3);
+            stop(&run);
+        }
+        // In safe mode, or ended: a damaged table is no ordinary run.
+        let run = run.collect(child).expect_code(1);
+        assert!(run.is_closed(), "{}", run.stdout());
+        assert!(run.stderr().contains(file), "{fault}: {}", run.stderr());
+    }
+}
+
+#[test]
 fn programs_that_take_cores_memory_and_disk_end_with_their_time_and_the_ledger_closes() {
     let run = Run::new(&["--duration", "forever", "--from", "config/scenes/single.toml"]);
     let child = run.start();
