@@ -91,6 +91,10 @@ fn each_stage_killed_twice_at_start_up_too_is_detected_and_back_in_time() {
     }
     let planned = soaked.verdict["planned"].as_array().unwrap();
     assert_eq!(planned.len(), rows.len());
+    for row in rows {
+        let actions = row["action"].as_array().unwrap();
+        assert!(actions.contains(&"stage_restarted".into()) && row["detected_ms"].is_number(), "{row}");
+    }
     let matrix = std::fs::read_to_string(soaked.dir.path().join("out/matrix.md")).unwrap();
     assert!(STAGES.iter().all(|stage| matrix.contains(&format!("| kill, again at start-up | {stage} |"))), "{matrix}");
 }
@@ -136,6 +140,15 @@ nominal_s = 4.0
 name = "a command that there is not"
 refused = ["ctl", "party"]
 [[step]]
+name = "pause"
+ctl = ["pause"]
+[[step]]
+name = "go on"
+ctl = ["resume"]
+[[step]]
+name = "the tables are read again"
+ctl = ["reload"]
+[[step]]
 name = "the classifier is killed"
 inject = ["kill", "classifier"]
 [[step]]
@@ -153,8 +166,18 @@ replay = true
 fn a_short_day_ends_with_the_same_detections_from_its_own_recording() {
     let soaked = soak(&[], Some(DAY)).expect_passed();
     let steps = soaked.verdict["steps"].as_array().unwrap();
-    assert!(steps.len() == 6 && steps.iter().all(|step| step["passed"] == true), "{steps:?}");
-    assert!(steps[5]["note"].as_str().unwrap().ends_with(" compared, 0 differ"), "{steps:?}");
+    assert!(steps.len() == 9 && steps.iter().all(|step| step["passed"] == true), "{steps:?}");
+    assert!(steps[8]["note"].as_str().unwrap().ends_with(" compared, 0 differ"), "{steps:?}");
+}
+
+#[test]
+fn changes_of_mode_take_effect_and_none_is_stuck() {
+    let campaign = "kind = \"mode-changes\"\ntimes = 20\npause_ms = 250.0\nstuck_ms = 5000.0\n\
+                    commands = [\"resume\", \"pause\", \"safe\", \"degrade\"]\n";
+    let soaked = soak(&[], Some(campaign));
+    assert_eq!(soaked.verdict["steps"].as_array().unwrap().len(), 20, "{}", soaked.said);
+    assert_eq!(soaked.bar("changes that failed or stuck")["passed"], true, "{}", soaked.said);
+    assert_eq!(soaked.bar("ledgers not closed")["passed"], true, "{}", soaked.said);
 }
 
 #[test]

@@ -11,6 +11,10 @@ use crate::assets::Assets;
 use crate::cli::SoakArgs;
 use crate::{Failure, outputs, sources};
 
+/// How a new document of survival matrices begins.
+const HEAD: &str = "# Survival matrix\n\nWhat was done to the chain on purpose, and what came of it. Each section is written by its own \
+                    run; services/soak/README.md says how each figure is measured.\n";
+
 /// Runs the soak, writes what it has shown, prints it.
 pub(crate) fn soak(args: &SoakArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
@@ -27,6 +31,9 @@ pub(crate) fn soak(args: &SoakArgs) -> Result<(), Failure> {
     let length_s = args.duration.map(|duration| duration.as_secs_f64());
     if length_s.is_none() && !campaign.has_length() {
         return Err(Failure::start("--duration: this campaign has no length of its own: say how long"));
+    }
+    if let Some(path) = &args.matrix {
+        outputs::check(&[("--matrix", Some(path))], Path::new(""))?;
     }
     let name = args.instance.clone().unwrap_or_else(|| format!("soak-{}", std::process::id()));
     let out = std::path::absolute(&args.out).map_err(Failure::start)?;
@@ -48,6 +55,11 @@ pub(crate) fn soak(args: &SoakArgs) -> Result<(), Failure> {
     outputs::write_whole(&out.join("verdict.html"), verdict.to_html().as_bytes())?;
     if !verdict.faults.is_empty() {
         outputs::write_whole(&out.join("matrix.md"), verdict.to_markdown().as_bytes())?;
+    }
+    if let (Some(path), Some(campaign)) = (&args.matrix, &args.faults) {
+        let title = campaign.file_stem().unwrap_or_default().to_string_lossy();
+        let document = fs::read_to_string(path).unwrap_or_else(|_| HEAD.to_owned());
+        outputs::write_whole(path, soak::with_section(&document, &title, &verdict.to_markdown()).as_bytes())?;
     }
     crate::print(&if args.json { json } else { verdict.summary() })?;
     verdict.failure(args.strict).map_or(Ok(()), |cause| Err(Failure::Failed(cause)))

@@ -40,6 +40,9 @@ pub(crate) struct SoakArgs {
     /// Folder for all that is written.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// Put the survival matrix into this document, too: as the section that has the campaign's name.
+    #[arg(long, value_name = "FILE.md", requires = "faults")]
+    pub(crate) matrix: Option<PathBuf>,
     /// Print the verdict as JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,5 +1,15 @@
+use events::{CHAIN, Event, EventId};
 use faults::{Fault, Lasting, Planned};
 use serde::{Deserialize, Serialize};
+
+/// Events that say that a stage is not well.
+const HEALTH: [EventId; 5] = [
+    EventId::StageDied,
+    EventId::StageHung,
+    EventId::StageSpinning,
+    EventId::StageSilent,
+    EventId::StageFlooding,
+];
 
 /// A fault to come: when, and what `encke inject` is told.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -49,6 +59,14 @@ impl Injection {
         self.stage.is_none() || self.ends_supervisor() || self.fault == "shared-memory-gone"
     }
 
+    /// Whether an event shows that the chain knows of it: the one that the catalogue of faults names, or one of a stage's health.
+    pub fn is_sign(&self, event: &Event) -> bool {
+        let named = Fault::from_name(&self.fault).and_then(|fault| fault.entry().event);
+        let about = self.stage.as_ref().is_none_or(|stage| *stage == event.stage);
+        let id = event.event_id();
+        (id.is_some() && id == named && (about || event.stage == CHAIN)) || (about && id.is_some_and(|id| HEALTH.contains(&id)))
+    }
+
     /// Its name in tables.
     pub fn title(&self) -> String {
         let again = if self.again_ms.is_some() { ", again at start-up" } else { "" };
@@ -77,6 +95,30 @@ mod tests {
         assert_eq!(lasts_s(Fault::CrashLoop, Some("extractor")), 50.0);
         let planned = Planned { for_s: None, ..Planned::usual(Fault::Slow, 10.0, Some("source".to_owned()), 1) };
         assert_eq!(Injection::of(&planned, 60.0, 0.1).lasts_s, 50.0);
+    }
+
+    #[test]
+    fn a_sign_is_about_whom_the_fault_hit() {
+        let of = |stage: Option<&str>, fault| {
+            Injection::of(&Planned::usual(fault, 0.0, stage.map(str::to_owned), 1), 60.0, 0.1)
+        };
+        let said = |id: EventId, stage: &str| Event {
+            number: 0,
+            time_ns: 0,
+            utc_ns: 0,
+            id: id as u32,
+            name: id.entry().name.to_owned(),
+            severity: id.severity(),
+            stage: stage.to_owned(),
+            sweep: 0,
+            text: String::new(),
+            unsaid: 0,
+        };
+        let kill = of(Some("extractor"), Fault::Kill);
+        assert!(kill.is_sign(&said(EventId::StageDied, "extractor")));
+        assert!(!kill.is_sign(&said(EventId::StageDied, "source")) && !kill.is_sign(&said(EventId::StepReturned, CHAIN)));
+        let flood = of(None, Fault::CommandFlood);
+        assert!(flood.is_sign(&said(EventId::CommandRefused, CHAIN)) && !flood.is_sign(&said(EventId::StepTaken, CHAIN)));
     }
 
     #[test]

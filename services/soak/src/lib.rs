@@ -24,6 +24,7 @@ pub use error::SoakError;
 pub use injection::Injection;
 pub use look::{Growth, ProcessRecord, Steady};
 pub use matrix::{Invariants, Line, Matrix, Row};
+pub use page::with_section;
 pub use run::Setup;
 pub use soak::{Settings, soak};
 pub use statistics::{Drift, Slope, Tally, WindowReport};

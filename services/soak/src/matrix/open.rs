@@ -1,6 +1,6 @@
 use std::process::Child;
 
-use events::{CHAIN, Event};
+use events::{CHAIN, Event, EventId};
 use runtime::page::Counts;
 
 use super::{Invariants, Row};
@@ -8,9 +8,30 @@ use crate::Injection;
 use crate::look::{Observer, SharedMemory};
 use crate::statistics::Answer;
 
+/// Events that say that something was done.
+const ACTIONS: [EventId; 17] = [
+    EventId::SupervisorAdopted,
+    EventId::StageRestarted,
+    EventId::StageKilled,
+    EventId::BudgetSpent,
+    EventId::StandIn,
+    EventId::StageGivenUp,
+    EventId::ChainRestarted,
+    EventId::TapeStopped,
+    EventId::SentAgain,
+    EventId::StaleRefused,
+    EventId::StepTaken,
+    EventId::SafeEntered,
+    EventId::CommandRefused,
+    EventId::TableRefused,
+    EventId::FileFailed,
+    EventId::EventsUnsaid,
+    EventId::ClockStep,
+];
+
 /// File descriptors that a process may have more than before the first fault. Who tells another that something was sent opens the
 /// way there when it does so for the first time, the supervisor after a death; so each process comes to have a few more, once.
-const FIRST_TIME_FILES: u64 = 8;
+const FIRST_TIME_FILES: u64 = 16;
 
 /// A fault that is under way, watched until the next one.
 pub(crate) struct Open {
@@ -121,14 +142,14 @@ impl Open {
             }
         }
         for event in events.iter().filter(|event| event.time_ns >= self.at_ns && event.name != "fault_injected") {
-            let about = |stage: &String| *stage == event.stage || event.stage == CHAIN;
-            if self.injection.stage.as_ref().is_some_and(|stage| !about(stage)) {
-                continue;
+            if self.injection.is_sign(event) {
+                self.detected.get_or_insert((event.time_ns, "event"));
             }
-            if !self.action.contains(&event.name) {
+            let about = self.injection.stage.as_ref().is_none_or(|stage| *stage == event.stage || event.stage == CHAIN);
+            let is_action = event.event_id().is_some_and(|id| ACTIONS.contains(&id));
+            if about && is_action && !self.action.contains(&event.name) {
                 self.action.push(event.name.clone());
             }
-            self.detected.get_or_insert((event.time_ns, "event"));
         }
         let hit = self.injection.stage.as_deref().and_then(|stage| observer.pages.of(stage));
         if self.detected.is_none() && hit.is_some_and(|counts| self.is_known(counts)) {

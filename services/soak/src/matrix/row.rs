@@ -17,7 +17,7 @@ pub struct Row {
     pub detected_ms: Option<f64>,
     /// `event`, or `page` where the supervisor's account of the life was the first sign.
     pub detected_by: Option<String>,
-    /// Events about it, in order, each once.
+    /// What was done, as events: in order, each once.
     pub action: Vec<String>,
     /// From the injection to the end of the longest gap between whole answers [ms]; 0 where there was none, null where it had no
     /// end before the next fault.

@@ -32,3 +32,50 @@ impl Verdict {
         )
     }
 }
+
+/// Marks where a campaign's section begins.
+const HEADING: &str = "## ";
+
+/// A document of sections, with the one of this title replaced, or added at its end.
+pub fn with_section(document: &str, title: &str, body: &str) -> String {
+    let mut text = String::new();
+    let (mut inside, mut written) = (false, false);
+    for line in document.lines() {
+        if let Some(name) = line.strip_prefix(HEADING) {
+            inside = name.trim() == title;
+            if inside {
+                text += &format!("{HEADING}{title}\n\n{}\n\n", body.trim());
+                written = true;
+            }
+        }
+        if !inside {
+            text += line;
+            text.push('\n');
+        }
+    }
+    if !written {
+        let gap = if text.is_empty() { "" } else { "\n" };
+        text = format!(
+            "{}{gap}{HEADING}{title}\n\n{}\n",
+            text.trim_end().to_owned() + if text.is_empty() { "" } else { "\n" },
+            body.trim()
+        );
+    }
+    text.trim_end().to_owned() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_is_replaced_where_it_stands_and_added_where_it_does_not() {
+        let document = with_section("# Survival\n\nWords.\n", "kills", "one");
+        assert_eq!(document, "# Survival\n\nWords.\n\n## kills\n\none\n");
+        let document = with_section(&document, "day", "two");
+        assert_eq!(document, "# Survival\n\nWords.\n\n## kills\n\none\n\n## day\n\ntwo\n");
+        let document = with_section(&document, "kills", "three\n");
+        assert_eq!(document, "# Survival\n\nWords.\n\n## kills\n\nthree\n\n## day\n\ntwo\n");
+        assert_eq!(with_section("", "a", "b"), "## a\n\nb\n");
+    }
+}

@@ -6,6 +6,8 @@ mod plots;
 mod style;
 mod tables;
 
+pub use markdown::with_section;
+
 use crate::verdict::{Bar, Verdict};
 use tables::escaped;
 
