@@ -4,7 +4,7 @@
 
 mod support;
 
-use std::process::Child;
+use std::process::{Child, Command};
 use std::time::Duration;
 
 use runtime::Plan;
@@ -29,7 +29,12 @@ impl Endless {
         let endless = ("restarts = 10", "restarts = 1000");
         let (config, chain) = chain_with(&[&[endless], changes].concat());
         let run = Run::new(&["--duration", "forever", "--chain", &chain]);
-        let child = run.start();
+        // What is said of thousands of deaths does not fit into a pipe that nobody reads meanwhile.
+        let child = run.start_with(|encke| {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", "exec \"$@\" 2>/dev/null", "sh"]).arg(encke.get_program()).args(encke.get_args());
+            shell
+        });
         run.wait_for_sweeps(5);
         let pids = pids(&run.status().unwrap());
         Self { run, child, pids, _config: config }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use faults::Fault;
-use rustix::process::{Resource, Rlimit, prlimit};
+use rustix::process::{Resource, Rlimit, getrlimit, prlimit};
 
 use super::Injection;
 use crate::Failure;
@@ -25,13 +25,9 @@ impl Injection {
     fn fill_disk(&self) -> Result<(), Failure> {
         let pid = self.process()?;
         let failed = |cause| Failure::run(format!("{}: its limit of file sizes: {cause}", self.stage()));
-        let none = Rlimit { current: Some(0), maximum: None };
-        // The upper limit cannot be raised again by everybody, so it stays what it is.
-        let before = prlimit(Some(pid), Resource::Fsize, none.clone()).map_err(failed)?;
-        if before.maximum.is_some() {
-            let within = Rlimit { current: Some(0), ..before.clone() };
-            prlimit(Some(pid), Resource::Fsize, within).map_err(failed)?;
-        }
+        // The upper limit cannot be raised again by everybody; processes of one user have the same.
+        let none = Rlimit { current: Some(0), ..getrlimit(Resource::Fsize) };
+        let before = prlimit(Some(pid), Resource::Fsize, none).map_err(failed)?;
         self.wait();
         // Whoever was ended meanwhile needs no limit.
         if self.process().ok() == Some(pid) {
