@@ -41,12 +41,14 @@ impl Watch<'_> {
             (word, Some(_), _) => Answer::no(format!("{} takes no stage", word.name())),
             (word, None, Some(_)) => Answer::no(format!("{} takes no tables", word.name())),
             (Word::Pause, None, None) => {
+                let was_paused = self.modes.is_paused();
                 self.wish(Wish::Pause);
-                Answer::yes("paused after the sweep under way")
+                Answer::yes(if was_paused { "paused already" } else { "paused after the sweep under way" })
             }
             (Word::Safe, None, None) => {
                 self.enter_safe(By::Command, "by command");
-                Answer::yes(format!("{} from the next sweep on; resume leads out", self.mode_in_words()))
+                let from = if self.modes.is_paused() { "once the pause is over" } else { "from the next sweep on" };
+                Answer::yes(format!("safe {from}; resume leads out"))
             }
             (Word::Degrade, None, None) => self.degrade_by_command(),
             (Word::Resume, None, None) => self.resume()?,
