@@ -27,9 +27,10 @@ pub(crate) fn events(instance: Option<&str>, json: bool, args: &EventsArgs) -> R
     show(&Plan::events_path(&instance), json, args, least, || Running::of(&instance).is_some())
 }
 
-/// Prints what is in the log; with --follow, then what comes as long as `goes_on`.
+/// Prints what is in the log; with --follow, then what comes as long as `goes_on`. What was cut away is told on stderr.
 fn show(log: &Path, json: bool, args: &EventsArgs, least: Severity, goes_on: impl Fn() -> bool) -> Result<(), Failure> {
     let mut reader = Reader::new(log, args.since.unwrap_or(0));
+    let mut missed = 0;
     loop {
         // Asked before the look: what was said until the end is read.
         let more = args.follow && goes_on();
@@ -40,6 +41,10 @@ fn show(log: &Path, json: bool, args: &EventsArgs, least: Severity, goes_on: imp
                 text.push('\n');
             }
         });
+        if reader.missed() > missed {
+            eprintln!("encke: {} events are not in the log any more", reader.missed() - missed);
+            missed = reader.missed();
+        }
         if !text.is_empty() && !write(&text)? {
             return Ok(());
         }

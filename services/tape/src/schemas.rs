@@ -28,6 +28,9 @@ pub(crate) const STATUS: &str = r#"{
  "instance":{"type":"string"},
  "mode":{"type":"string"},
  "sweep":{"type":"integer"},
+ "sectors":{"type":"integer","description":"so many parts are one sweep"},
+ "step":{"type":"string"},
+ "latency_ms":{"type":["number","null"]},
  "stages":{"type":"array","items":{"type":"object","properties":{
   "stage":{"type":"string"},
   "pid":{"type":"integer"},
@@ -35,6 +38,17 @@ pub(crate) const STATUS: &str = r#"{
   "restarts":{"type":"integer"},
   "heartbeat_age_ms":{"type":"number"},
   "received":{"type":"integer"},
-  "published":{"type":"integer"}
+  "published":{"type":"integer"},
+  "dropped":{"type":"integer"},
+  "lost":{"type":"integer"},
+  "processed":{"type":"integer"},
+  "rejected":{"type":"object","additionalProperties":{"type":"integer"},"description":"by reason"},
+  "overruns":{"type":"integer"},
+  "slips":{"type":"integer"},
+  "late":{"type":"integer"},
+  "queue":{"type":["integer","null"]},
+  "tier":{"type":"string"},
+  "cpu_s":{"type":["number","null"]},
+  "rss_mib":{"type":["number","null"]}
  }}}
 }}"#;
