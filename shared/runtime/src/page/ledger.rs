@@ -432,10 +432,10 @@ mod tests {
         // One part accepted and not written, one in hand.
         let died = || {
             let (dir, page) = page();
-            drop(page.take_in_hand(part(0), 0, false));
+            let _ = page.take_in_hand(part(0), 0, false);
             page.count_accepted(Verdict::Complete);
             page.put_down();
-            drop(page.take_in_hand(part(1), 1, false));
+            let _ = page.take_in_hand(part(1), 1, false);
             (dir, page)
         };
         let gap = Gap { kind: GapKind::Lost, first_ordinal: 0, end_ordinal: 2, parts: 2 };
