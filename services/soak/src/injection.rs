@@ -3,13 +3,8 @@ use faults::{Fault, Lasting, Planned};
 use serde::{Deserialize, Serialize};
 
 /// Events that say that a stage is not well.
-const HEALTH: [EventId; 5] = [
-    EventId::StageDied,
-    EventId::StageHung,
-    EventId::StageSpinning,
-    EventId::StageSilent,
-    EventId::StageFlooding,
-];
+const HEALTH: [EventId; 5] =
+    [EventId::StageDied, EventId::StageHung, EventId::StageSpinning, EventId::StageSilent, EventId::StageFlooding];
 
 /// A fault to come: when, and what `encke inject` is told.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -64,7 +59,8 @@ impl Injection {
         let named = Fault::from_name(&self.fault).and_then(|fault| fault.entry().event);
         let about = self.stage.as_ref().is_none_or(|stage| *stage == event.stage);
         let id = event.event_id();
-        (id.is_some() && id == named && (about || event.stage == CHAIN)) || (about && id.is_some_and(|id| HEALTH.contains(&id)))
+        (id.is_some() && id == named && (about || event.stage == CHAIN))
+            || (about && id.is_some_and(|id| HEALTH.contains(&id)))
     }
 
     /// Its name in tables.
@@ -116,9 +112,13 @@ mod tests {
         };
         let kill = of(Some("extractor"), Fault::Kill);
         assert!(kill.is_sign(&said(EventId::StageDied, "extractor")));
-        assert!(!kill.is_sign(&said(EventId::StageDied, "source")) && !kill.is_sign(&said(EventId::StepReturned, CHAIN)));
+        assert!(
+            !kill.is_sign(&said(EventId::StageDied, "source")) && !kill.is_sign(&said(EventId::StepReturned, CHAIN))
+        );
         let flood = of(None, Fault::CommandFlood);
-        assert!(flood.is_sign(&said(EventId::CommandRefused, CHAIN)) && !flood.is_sign(&said(EventId::StepTaken, CHAIN)));
+        assert!(
+            flood.is_sign(&said(EventId::CommandRefused, CHAIN)) && !flood.is_sign(&said(EventId::StepTaken, CHAIN))
+        );
     }
 
     #[test]

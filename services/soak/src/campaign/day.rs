@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
 use chain::{Mode, SUPERVISOR};
-use runtime::page::PageView;
+use runtime::page::{PageView, State};
 use runtime::{Plan, clock};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -171,32 +171,36 @@ fn ask<'w>(words: impl Iterator<Item = &'w str>, session: &mut Session<'_>) -> R
 fn command(words: &[String], settings: &Settings, session: &mut Session<'_>) -> Result<Outcome, SoakError> {
     let instance = &settings.setup.instance;
     let generation = Plan::read(instance).map_or(0, |plan| plan.generation);
+    let lives: Vec<(String, u64)> =
+        session.observer.pages.all().map(|(stage, counts)| (stage.to_owned(), counts.incarnation)).collect();
     let asked_ns = clock::now_ns();
     let all = ["ctl"].into_iter().chain(words.iter().map(String::as_str)).chain(["--instance", instance.name()]);
     let (accepted, said) = ask(all, session)?;
     if !accepted {
         return Ok(Err(said));
     }
-    let wanted = match words.first().map(String::as_str) {
-        Some("pause") => Some(Mode::Paused),
-        Some("resume") => Some(Mode::Nominal),
-        Some("safe") => Some(Mode::Safe),
-        Some("degrade") => Some(Mode::Degraded),
-        _ => None,
-    };
-    let reload = words.first().is_some_and(|word| word == "reload");
-    if wanted.is_none() && !reload {
+    let word = words.first().map_or("", String::as_str);
+    if !["pause", "resume", "safe", "degrade", "reload", "restart"].contains(&word) {
         return Ok(Ok((None, String::new())));
     }
     let page = PageView::open(&Plan::page_path(instance, SUPERVISOR)).map_err(SoakError::chain)?;
     while session.goes_on() && clock::now_ns() < asked_ns + EFFECT_NS {
         session.turn(false)?;
         let mode = Mode::from_number(page.counts().mode);
+        let pages = &session.observer.pages;
         let parameters = &session.observer.plan.parameters;
-        let mut tables = session.observer.pages.all().filter(|(stage, _)| parameters.contains_key(*stage));
-        let done = match wanted {
-            Some(wanted) => mode == wanted,
-            None => tables.all(|(_, counts)| counts.table_active > generation),
+        let mut tables = pages.all().filter(|(stage, _)| parameters.contains_key(*stage));
+        let done = match word {
+            "pause" => mode == Mode::Paused,
+            "safe" => mode == Mode::Safe,
+            "degrade" => mode == Mode::Degraded,
+            // The ladder of overload may leave something out by itself.
+            "resume" => mode != Mode::Paused && mode != Mode::Safe,
+            "reload" => tables.all(|(_, counts)| counts.table_active > generation),
+            _ => pages.all().filter(|(stage, _)| words.iter().any(|word| word == stage)).all(|(stage, counts)| {
+                counts.state == State::Running
+                    && lives.iter().all(|(of, life)| of != stage || counts.incarnation > *life)
+            }),
         };
         if done {
             let took_ms = (clock::now_ns() - asked_ns) as f64 / 1e6;
