@@ -107,7 +107,8 @@ impl Taping {
     }
 }
 
-/// Events that earlier lives have in their files: this one goes on with the next. Each is one message.
+/// Events that earlier lives have in their files: this one goes on with the next. Each is one message. What a life had written
+/// and not counted when it died comes again, under the same number; none is left out.
 fn recorded_events(shell: &Shell) -> u64 {
     let of_life = |life: u32| {
         let text = std::fs::read(Plan::counts_path(shell.instance(), life)).ok()?;
