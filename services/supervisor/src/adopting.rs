@@ -1,9 +1,7 @@
 //! A supervisor that follows one that died: it goes on with the processes, the pages and the log that it finds.
 
-use chain::Mode;
 use events::{CHAIN, EventId};
-use messages::Step;
-use runtime::page::{PageMap, Tier};
+use runtime::page::PageMap;
 use runtime::{Plan, clock};
 
 use crate::SupervisorError;
@@ -59,17 +57,10 @@ impl Watch<'_> {
         let source = &self.stages[0].page;
         self.begun = source.may_start.get() == 1;
         let sweeps = source.published.get() / u64::from(self.plan.chain.sectors.max(1));
-        let step = Step::from_number(source.step.get() as u32);
-        let (mode, paused) = (Mode::from_number(self.page.mode.get()), source.pause.get() > 0);
-        // What lies behind a pause shows in the step alone.
-        let safe = mode == Mode::Safe || (paused && step >= Step::ClustersOnly);
-        let step = if safe { Step::Nominal } else { step };
-        self.modes.take_over(step, safe, paused);
-        self.ladder_stood = step;
+        let step = self.take_over_modes();
         self.ladder.resume(step, sweeps, Trouble::of(self.stages.iter().map(|stage| &*stage.page)));
-        for (stage, lives) in self.stages.iter_mut().zip(&mut self.lives) {
+        for stage in &mut self.stages {
             stage.restarts.total = stage.page.incarnation.get().saturating_sub(1);
-            lives.take_over(Tier::from_number(stage.page.tier.get()));
         }
         // What they used until now is theirs, and was not used since the last look.
         self.sample();

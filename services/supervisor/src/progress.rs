@@ -3,6 +3,7 @@
 use std::io::{IsTerminal, Write};
 
 use runtime::Plan;
+use runtime::logging::Stderr;
 
 use crate::child::Watched;
 
@@ -49,17 +50,16 @@ impl Progress {
             source.page.next_ordinal_out.get() / self.sectors,
             sink.page.processed.get().min(sink.page.next_ordinal_out.get()) / self.sectors,
         );
-        let mut stderr = std::io::stderr().lock();
+        let text = if self.on_terminal { format!("\r{line}\x1b[K") } else { format!("{line}\n") };
         // A closed stderr is no reason to stop a chain.
-        let _ = if self.on_terminal { write!(stderr, "\r{line}\x1b[K") } else { writeln!(stderr, "{line}") };
-        let _ = stderr.flush();
+        let _ = Stderr.write(text.as_bytes());
         self.shown = true;
     }
 
     /// Clears the live line.
     pub(crate) fn end(&self) {
         if self.on_terminal && self.shown {
-            let _ = write!(std::io::stderr(), "\r\x1b[K");
+            let _ = Stderr.write(b"\r\x1b[K");
         }
     }
 }

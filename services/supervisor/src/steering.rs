@@ -38,7 +38,6 @@ impl Watch<'_> {
 
     /// Goes on in the mode, and with the tiers, that the pages say, where one supervisor follows another. The step at which the
     /// ladder stands.
-    #[allow(dead_code, reason = "called where a chain is adopted")]
     pub(crate) fn take_over_modes(&mut self) -> Step {
         let (mode, step) = (Mode::from_number(self.page.mode.get()), self.stages[0].page.step.get());
         self.ladder_stood = self.modes.take_over(mode, Step::from_number(step as u32));

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::FormatTime;
@@ -18,12 +19,36 @@ impl FormatTime for HostTime {
     }
 }
 
+/// Standard error that never makes anybody wait: what a pipe that nobody reads has no room for is left out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stderr;
+
+/// A pipe that can be written to at all takes so many bytes without waiting (PIPE_BUF, pipe(7)).
+const AT_ONCE: usize = 4_096;
+
+impl Write for Stderr {
+    /// Writes up to 4,096 bytes, or nothing; says that all of it was written.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let stderr = io::stderr();
+        let mut ready = [PollFd::new(&stderr, PollFlags::OUT)];
+        let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
+        if poll(&mut ready, Some(&at_once)).is_ok_and(|ready| ready > 0) {
+            stderr.lock().write_all(&bytes[..bytes.len().min(AT_ONCE)])?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Sends events of `default_level` and above to stderr; `RUST_LOG` overrides the level.
 pub fn install(default_level: &str) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_level));
     let subscriber = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(io::stderr)
+        .with_writer(|| Stderr)
         .with_ansi(false)
         .with_target(false)
         .with_timer(HostTime)
@@ -39,7 +64,7 @@ pub fn install(default_level: &str) {
 pub fn abort_at_once_on_panic() {
     std::panic::set_hook(Box::new(|info| {
         // Not to be written is no reason to panic again.
-        let _ = writeln!(io::stderr(), "{info}");
+        let _ = Stderr.write(format!("{info}\n").as_bytes());
         std::process::abort();
     }));
 }

@@ -81,7 +81,6 @@ impl Executive {
     }
 
     /// Another table from now on.
-    #[allow(dead_code, reason = "called when tables are reloaded")]
     pub(crate) fn replace(&mut self, table: &Table, now_ns: u64) {
         self.rules.replace(&table.rules);
         self.limits.replace(&table.limits, &self.names, now_ns);
@@ -94,7 +93,6 @@ impl Executive {
     }
 
     /// What is the matter with the process at `place` now.
-    #[allow(dead_code, reason = "for whoever feeds a watchdog")]
     pub(crate) fn condition(&self, place: usize) -> Option<Condition> {
         self.patients.get(place)?.ailment().map(|ailment| ailment.condition)
     }
