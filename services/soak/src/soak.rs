@@ -71,7 +71,7 @@ pub fn soak(settings: &Settings) -> Result<Verdict, SoakError> {
                 let (_, now_ns) = session.turn(false)?;
                 changes.turn(session.observer.t_s(now_ns), now_ns);
             }
-            let late = changes.late();
+            let late = changes.took_too_long();
             let steps = std::mem::take(&mut changes.steps);
             let ended = Ended { steps, ..Ended::default() };
             finish(base, settings, session, ended, |facts, ended| modes(facts, ended, file.times, late))
@@ -306,7 +306,7 @@ fn starts(base: Verdict, bars: crate::bars::StartBars, times: usize, cycles: Vec
 fn say(number: usize, cycle: &Cycle) {
     if let Some(failed) = &cycle.failed {
         eprintln!("start {}: {failed}", number + 1);
-    } else if (number + 1) % 100 == 0 {
+    } else if (number + 1).is_multiple_of(100) {
         eprintln!("{} starts", number + 1);
     }
 }

@@ -57,7 +57,7 @@ impl ModeChanges {
     }
 
     /// Changes that took longer than two sweeps, as the supervisor counts them.
-    pub(crate) fn late(&self) -> u64 {
+    pub(crate) fn took_too_long(&self) -> u64 {
         self.page.counts().modes_late
     }
 

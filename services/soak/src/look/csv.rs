@@ -21,8 +21,8 @@ impl Csv {
 
     /// Adds a row, or leaves it out.
     pub(crate) fn row(&mut self, values: &[String]) {
-        let every = 1 << (self.rows / THIN_AFTER).min(40);
-        if self.offered % every == 0 {
+        let every = 1_u64 << (self.rows / THIN_AFTER).min(40);
+        if self.offered.is_multiple_of(every) {
             self.rows += 1;
             self.write(values);
         }
