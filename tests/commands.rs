@@ -173,10 +173,10 @@ fn another_user_is_refused_in_one_clear_line() {
         command.env("XDG_RUNTIME_DIR", home.path());
         command
     });
-    let as_nobody = |args: &[&str]| {
+    let as_nobody = |args: &[&str], home: &std::path::Path| {
         let mut command = Command::new("setpriv");
         command.args(["--reuid", "65534", "--regid", "65534", "--clear-groups"]).arg(&binary).args(args);
-        command.args(["--instance", &run.instance]).env("XDG_RUNTIME_DIR", home.path()).current_dir("/");
+        command.args(["--instance", &run.instance]).env("XDG_RUNTIME_DIR", home).current_dir("/");
         command.output().unwrap()
     };
     let as_root = |args: &[&str]| {
@@ -187,14 +187,23 @@ fn another_user_is_refused_in_one_clear_line() {
     let dir = base.join(&run.instance);
     let began = runtime::clock::wait_for(20_000_000_000, || as_root(&["status"]).status.success());
     assert!(began);
-    let refused = as_nobody(&["ctl", "pause"]);
+    let refused = as_nobody(&["ctl", "pause"], home.path());
     assert_eq!(refused.status.code(), Some(2));
-    assert!(text(&refused.stderr).contains("belongs to another user"), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("belongs to uid 0"), "{}", text(&refused.stderr));
 
+    // A link in a folder of his own leads there.
+    let his = tempfile::Builder::new().prefix("h").tempdir_in("/tmp").unwrap();
+    let his_base = his.path().join("encke");
+    std::fs::create_dir(&his_base).unwrap();
+    std::os::unix::fs::symlink(&dir, his_base.join(&run.instance)).unwrap();
+    for (path, bits) in [(his.path(), 0o700), (&his_base, 0o700)] {
+        mode(path, bits);
+        std::os::unix::fs::chown(path, Some(65_534), Some(65_534)).unwrap();
+    }
     for (path, bits) in [(&base, 0o755), (&dir, 0o755), (&dir.join("lock"), 0o644), (&dir.join("control"), 0o666)] {
         mode(path, bits);
     }
-    let refused = as_nobody(&["ctl", "pause"]);
+    let refused = as_nobody(&["ctl", "pause"], his.path());
     assert_eq!(refused.status.code(), Some(1));
     let said = text(&refused.stderr);
     assert!(said.contains("takes commands of user 0 alone, and you are user 65534"), "{said}");

@@ -199,7 +199,8 @@ fn what_a_live_sensor_sends_during_a_pause_is_discarded() {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     let port = socket.local_addr().unwrap().port();
     drop(socket);
-    let run = Run::new(&["--from", &format!("udp://127.0.0.1:{port}")]);
+    let sensor = ["--sensor", "hdl-32e-paper"]; // the scene's
+    let run = Run::new(&[&["--from", &format!("udp://127.0.0.1:{port}")][..], &sensor].concat());
     let child = run.start();
     run.wait_for(|status| status["stages"].as_array().unwrap().iter().all(|stage| stage["state"] == "running"));
     let run = std::thread::scope(|scope| {

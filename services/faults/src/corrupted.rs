@@ -145,6 +145,10 @@ impl<S: Source, F: FnMut() -> Option<Held>> Source for Corrupted<S, F> {
         self.source.skip(sweeps, sweep, truth)
     }
 
+    fn discard(&mut self) {
+        self.source.discard();
+    }
+
     fn is_live(&self) -> bool {
         self.source.is_live()
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use events::{CHAIN, EventId};
+use events::EventId;
 use runtime::clock;
 use runtime::page::State;
 
@@ -32,13 +32,12 @@ impl Watch<'_> {
                 let published = self.stages[position - 1].page.published.get();
                 let lost = self.stages[position].page.lose_below(published);
                 if lost > 0 {
-                    tracing::error!(stage = self.stages[position].name, lost, "lost what waited for it");
+                    let name = self.stages[position].name.clone();
+                    self.say(EventId::PartsLost, &name, &format!("{lost} parts that waited for it"));
                 }
             }
         }
-        self.end_tape()?;
-        self.say(EventId::RunEnds, CHAIN, "drained; all processes have left");
-        Ok(())
+        self.end_tape()
     }
 
     /// Tells a stage to leave and waits for it; one that does not is killed.

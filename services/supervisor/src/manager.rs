@@ -58,11 +58,9 @@ impl Manager {
         is_due
     }
 
-    fn tell(&self, text: &str) {
-        if let Some(socket) = &self.socket {
-            // A manager that does not read is no reason to stop a chain.
-            let _ = socket.send(text.as_bytes());
-        }
+    /// Whether the message is on its way. A manager that does not read is no reason to stop a chain.
+    fn tell(&self, text: &str) -> bool {
+        self.socket.as_ref().is_some_and(|socket| socket.send(text.as_bytes()).is_ok())
     }
 }
 
@@ -84,8 +82,9 @@ impl Watch<'_> {
     pub(crate) fn tell_manager(&mut self) {
         let now_ns = clock::now_ns();
         let stopping = self.stop_asked || self.failed.is_some() || self.stages[0].told;
-        if stopping && !std::mem::replace(&mut self.manager.stopping, stopping) {
-            self.manager.tell("STOPPING=1\nSTATUS=stopping: each stage drains its input\n");
+        // What has to be known is said again until there is room for it.
+        if stopping && !self.manager.stopping {
+            self.manager.stopping = self.manager.tell("STOPPING=1\nSTATUS=stopping: each stage drains its input\n");
         }
         let begins = self.begun && !self.manager.ready;
         if !self.manager.is_due(now_ns) && !begins {
@@ -104,7 +103,9 @@ impl Watch<'_> {
         }
         self.manager.held = if well { 0 } else { self.manager.held.saturating_add(1) };
         match self.manager.held {
-            0 => self.manager.tell("WATCHDOG=1\n"),
+            0 => {
+                self.manager.tell("WATCHDOG=1\n");
+            }
             // A restart may fall upon one message.
             SAID_AT => self.say(EventId::WatchdogHeld, CHAIN, &format!("not well: {}", self.unwell().join(", "))),
             _ => {}
