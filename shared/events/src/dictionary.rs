@@ -120,8 +120,8 @@ dictionary! {
     TableActive = 508, Info, "table_active", "parameters {a} are in use from sweep {b} on", "A stage uses its new parameters.";
 
     // 6xx: files
-    FileFailed = 601, Error, "file_failed", "", "A file could not be written and is closed; what it lacks is counted.";
-    FileRotated = 602, Info, "file_rotated", "", "The recording goes on in the next file.";
+    FileFailed = 601, Error, "file_failed", "{a} files could not be written, {b} by now", "A file could not be written and is closed; what it lacks is counted.";
+    FileRotated = 602, Info, "file_rotated", "file {a} of the recording is begun", "The recording goes on in the next file.";
     SharedMemoryGone = 603, Error, "shared_memory_gone", "", "Somebody deleted files of the chain in shared memory: whoever starts later could not join. The chain is stopped in order; start it again.";
 
     // 7xx: what the source sends

@@ -356,25 +356,3 @@ mod tests {
         assert_eq!(events(&path).last().unwrap().number, 2);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::CHAIN;
-
-    #[test]
-    fn a_successor_goes_on_with_the_next_number_and_drops_a_torn_line() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("events.jsonl");
-        let mut log = Log::create(&path).unwrap();
-        for sweep in 0..3 {
-            log.say((0, 0), EventId::RunBegan, CHAIN, sweep, "");
-        }
-        log.file.write_all(b"{\"number\":3,\"time").unwrap();
-        let mut sut = Log::resume(&path).unwrap();
-        sut.say((0, 0), EventId::SupervisorAdopted, CHAIN, 9, "");
-        let text = std::fs::read_to_string(&path).unwrap();
-        let numbers: Vec<u64> = text.lines().map(|line| serde_json::from_str::<Event>(line).unwrap().number).collect();
-        assert_eq!(numbers, [0, 1, 2, 3]);
-    }
-}

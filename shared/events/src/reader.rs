@@ -20,13 +20,15 @@ pub struct Reader {
     /// The beginning of a line whose end has not come.
     rest: Vec<u8>,
     next: u64,
+    /// Host time of the latest event [ns].
+    last_ns: u64,
     missed: u64,
 }
 
 impl Reader {
     /// Of the log at `path`, which need not be there yet, from event `since` on.
     pub fn new(path: &Path, since: u64) -> Self {
-        Self { path: path.to_owned(), file: None, rest: Vec::new(), next: since, missed: 0 }
+        Self { path: path.to_owned(), file: None, rest: Vec::new(), next: since, last_ns: 0, missed: 0 }
     }
 
     /// Passes over what is in the log now.
@@ -80,7 +82,12 @@ impl Reader {
 
     fn take(&mut self, line: &[u8], tell: &mut impl FnMut(Event)) {
         let Ok(event) = serde_json::from_slice::<Event>(line) else { return };
+        // Of another run under the same name, which counts from 0 again.
+        if event.number == 0 && event.time_ns > self.last_ns && self.last_ns > 0 {
+            self.next = 0;
+        }
         if event.number >= self.next {
+            self.last_ns = event.time_ns;
             self.missed = self.missed.saturating_add(event.number - self.next);
             self.next = event.number.saturating_add(1);
             tell(event);
@@ -139,6 +146,18 @@ mod tests {
         let mut late = Reader::new(&path, 0);
         late.skip();
         assert_eq!((late.next(), late.missed()), (6, 0));
+    }
+
+    #[test]
+    fn the_log_of_the_next_run_under_the_name_is_read_from_its_beginning() {
+        let dir = tempfile::tempdir().unwrap();
+        let (path, beside) = (dir.path().join("log"), dir.path().join("beside"));
+        fs::write(&path, line(0) + &line(1)).unwrap();
+        let mut sut = Reader::new(&path, 0);
+        assert_eq!(numbers(&mut sut), [0, 1]);
+        fs::write(&beside, (line(0) + &line(1)).replace("\"time_ns\":5", "\"time_ns\":9")).unwrap();
+        fs::rename(&beside, &path).unwrap();
+        assert_eq!((numbers(&mut sut), sut.missed()), (vec![0, 1], 0));
     }
 
     #[test]

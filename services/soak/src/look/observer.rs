@@ -130,7 +130,7 @@ impl<'a> Observer<'a> {
         let names = names.into_iter().take(PROCESSES).collect::<Vec<_>>();
         let stretch_s = (length_s / 30.0).clamp(1.0, 60.0);
         let window_ns = (length_s / 60.0).max(1.0) * 1e9;
-        let tail = Tail::new(Plan::events_path(instance), created(&out.join("events.jsonl"))?);
+        let tail = Tail::new(&Plan::events_path(instance), created(&out.join("events.jsonl"))?);
         let csv = Csv::new(created(&out.join("samples.csv"))?, &columns(&names));
         Ok(Self {
             instance,
@@ -330,7 +330,7 @@ impl<'a> Observer<'a> {
 
     /// Events by name, and numbers of the log that nobody saw.
     pub(crate) fn events(&self) -> (&std::collections::BTreeMap<String, u64>, u64) {
-        (&self.tail.counts, self.tail.skipped)
+        (&self.tail.counts, self.tail.skipped())
     }
 
     /// What this process took for all that [% of a core].
