@@ -60,10 +60,8 @@ pub(crate) enum Command {
     /// Run the chain for long, with faults or without, and judge what that has shown.
     #[command(after_help = SOAK_NOTES)]
     Soak(Box<SoakArgs>),
-    /// Look at a running chain, let it take a step, or stop it.
-    #[command(
-        after_help = "Examples:\n  encke ctl status --json\n  encke ctl events --follow --severity warning\n  encke ctl stop --instance flight-1"
-    )]
+    /// Look at a running chain, command it, or stop it.
+    #[command(after_help = CTL_EXAMPLES)]
     Ctl(CtlArgs),
     /// Say what this machine allows the chain, and what to do about the rest.
     #[command(after_help = DOCTOR_NOTES)]

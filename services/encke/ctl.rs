@@ -4,8 +4,9 @@ use rustix::process::{Pid, Signal, kill_process};
 use supervisor::{Command, Status, Tables, Word};
 use transport::Instance;
 
+use crate::assets::Assets;
 use crate::cli::{CtlArgs, EventsArgs, Request};
-use crate::{Failure, events, instances};
+use crate::{Failure, dispatch, events, instances, run};
 
 /// Looks at a running chain, or commands it.
 pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
@@ -17,9 +18,12 @@ pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
             "--follow, --since, --severity, --file and --dictionary are for `encke ctl events`",
         ));
     }
+    if let Some(contradiction) = args.contradiction() {
+        return Err(Failure::start(contradiction));
+    }
     let (instance, running) = instances::find(args.instance.as_deref())?;
-    match args.request {
-        Request::Events => Ok(()),
+    let command = match args.request {
+        Request::Events => return Ok(()),
         Request::Status => {
             let status = supervisor::status(&instance).map_err(Failure::start)?;
             let text = if args.json {

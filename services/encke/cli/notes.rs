@@ -62,6 +62,17 @@ Examples:
   encke doctor
   encke doctor --chain config/chain.toml --json    also what chain.toml asks for and would be refused";
 
+pub(super) const CTL_EXAMPLES: &str =
+    "Commands are taken of the chain's own user alone, 50 a second at most. Exit 1: the chain refused, and said why.
+Examples:
+  encke ctl status --json
+  encke ctl events --follow --severity warning
+  encke ctl pause                      then resume
+  encke ctl safe                       resume leads out of it, and of degrade
+  encke ctl restart extractor
+  encke ctl reload                     reads the chain's parameters and executive.toml again
+  encke ctl stop --instance flight-1";
+
 pub(super) const INJECT_EXAMPLES: &str = "\
 slow and slow-times last to the end of the run where --for names no time; slow --by 0ms ends slow. Faults that a stage
 has itself are counted down by it (--times); the others are over when the command returns.

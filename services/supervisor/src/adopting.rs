@@ -67,7 +67,6 @@ impl Watch<'_> {
         let living = self.stages.iter().filter(|stage| stage.pid().is_some()).count();
         let all = self.stages.len();
         let text = format!("{living} of {all} stages live on after the death of supervisor {before}");
-        tracing::warn!("adopted: {text}");
         self.say(EventId::SupervisorAdopted, CHAIN, &text);
     }
 }

@@ -68,7 +68,11 @@ impl Watch<'_> {
             realtime_refused: std::mem::take(&mut self.refused),
             stopped: self.failed.clone(),
             events: EventsReport::of(&self.log),
-            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, self.plan)),
+            mode: self.modes.mode(),
+            modes: self.modes.report,
+            safe_entered: self.safe_entered.clone(),
+            commands: self.commands_report(),
+            recording: self.tape.as_ref().map(|tape| tape.report(self.instance, &self.plan)),
         })
     }
 

@@ -109,7 +109,6 @@ impl Watch<'_> {
         let why = if why.is_empty() { "wrong, of another user, or too many" } else { &why };
         let text = format!("{count} refused; {why}");
         (self.refusals.told, self.refusals.told_ns) = (refused, now_ns);
-        tracing::warn!(count, why, "commands refused");
         self.say(EventId::CommandRefused, CHAIN, &text);
     }
 

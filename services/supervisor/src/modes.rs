@@ -221,16 +221,6 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_goes_on_in_the_mode_that_it_finds() {
-        let mut sut = Modes::new(4, true);
-        sut.take_over(Step::Nominal, true, true);
-        assert_eq!((sut.mode(), sut.step()), (Mode::Paused, Step::ClustersOnly));
-        assert!(!sut.is_changing(), "nothing was asked for");
-        assert!(sut.wish(Wish::Resume, still(10)));
-        assert_eq!(sut.mode(), Mode::Safe);
-    }
-
-    #[test]
     fn a_mode_is_in_effect_when_the_source_says_so() {
         let mut sut = Modes::new(4, true);
         assert!(sut.wish(Wish::Safe, seen(0, 10, Step::Nominal)));

@@ -41,12 +41,12 @@ impl Sample {
 /// CPU time [s] and resident memory [KiB] of a process by now; none when it is gone.
 pub(crate) fn cpu_and_memory(pid: u32) -> Option<(f64, u64)> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    let (cpu_ticks, rss_pages) = parse_stat(&stat)?;
+    let (cpu_ticks, _, rss_pages) = parse_stat(&stat)?;
     Some((cpu_ticks as f64 / clock_ticks_per_second() as f64, rss_pages * page_size() as u64 / 1024))
 }
 
-/// Ticks of user and system time, and resident pages, of a `/proc/PID/stat` (proc(5): fields 14, 15 and 24).
-fn parse_stat(stat: &str) -> Option<(u64, u64)> {
+/// Ticks of user and system time, threads, and resident pages, of a `/proc/PID/stat` (proc(5): fields 14, 15, 20 and 24).
+fn parse_stat(stat: &str) -> Option<(u64, u64, u64)> {
     // Field 2 is the name in parentheses and may hold anything.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let field = |number: usize| fields.get(number - 3)?.parse::<u64>().ok();

@@ -3,9 +3,11 @@
 
 use chain::executive::{Executive, ExecutiveFile};
 use events::{CHAIN, EventId};
+use runtime::clock;
 
 use crate::budget::Restarts;
 use crate::control::{Answer, Tables};
+use crate::telling::bounds;
 use crate::watch::Watch;
 
 /// The new parameters count from so many sweeps after the one under way.
@@ -42,7 +44,7 @@ impl Watch<'_> {
             return Answer::no(error.to_string());
         }
         self.plan = plan;
-        self.replace_executive(executive);
+        self.replace_executive(&executive);
         let (generation, sweep) = (self.plan.generation, self.sweeps_sent() + SWEEPS_AHEAD);
         for stage in self.stages.iter().filter(|stage| self.plan.parameters.contains_key(&stage.name)) {
             stage.page.table_from_sweep.set(sweep);
@@ -52,7 +54,9 @@ impl Watch<'_> {
     }
 
     /// The executive goes by another table from now on; restarts of the chain so far do not count in it.
-    fn replace_executive(&mut self, executive: Executive) {
+    fn replace_executive(&mut self, executive: &Executive) {
         self.chain_budget = Restarts::of_chain(executive.chain_budget);
+        self.executive.replace(executive, clock::now_ns());
+        self.log.set_bounds(bounds(&self.plan));
     }
 }

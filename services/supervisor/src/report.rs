@@ -7,6 +7,7 @@ use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::beside::RecordingReport;
+use crate::control::CommandsReport;
 use crate::events_report::EventsReport;
 use crate::ledger::LedgerReport;
 use crate::machine::MachineLoad;

@@ -22,7 +22,6 @@ impl Watch<'_> {
     ///
     /// # Errors
     /// A process cannot be started.
-    #[allow(dead_code, reason = "the engine that gives orders calls it")]
     pub(crate) fn obey(&mut self, order: &Order) -> Result<(), SupervisorError> {
         let reason = order.reason.as_str();
         match (order.action, order.stage) {
@@ -59,7 +58,6 @@ impl Watch<'_> {
         }
         if is_alive {
             let name = self.stages[position].name.clone();
-            tracing::warn!(stage = name, reason, "killed, to be started anew");
             self.say(EventId::StageKilled, &name, reason);
             self.stages[position].kill();
         } else if by == By::Command && was_given_up {
@@ -90,7 +88,6 @@ impl Watch<'_> {
             self.enter_safe(By::Executive, &reason);
             return Ok(());
         }
-        tracing::error!(reason, "all stages are killed, to be started anew");
         self.say(EventId::ChainRestarted, CHAIN, reason);
         let mut ended = vec![None; self.stages.len()];
         for position in 0..self.stages.len() {
@@ -168,10 +165,12 @@ impl Watch<'_> {
 
     /// A stage's process has ended: its account is settled. Whether it is to have a successor.
     fn recover(&mut self, position: usize, ended: Ended) -> Result<bool, SupervisorError> {
+        let lost_before = self.tell_death(position, ended);
         if let Some(tape) = self.tape.as_ref().filter(|_| position == 0 || self.is_sink(position + 1)) {
             tape.drain();
         }
         settle(&self.node, &self.services, &mut self.stages, position, ended);
+        self.tell_losses(position, lost_before);
         let stage = &mut self.stages[position];
         if stage.told {
             return Ok(false);
@@ -181,8 +180,6 @@ impl Watch<'_> {
         if is_refused && !self.begun {
             return Err(SupervisorError::Refused(name));
         }
-        let id = if is_refused { EventId::CannotStart } else { EventId::StageDied };
-        self.say(id, &name, &ended.in_words());
         let before = self.lives[position].tier();
         let after = self.lives[position].died(&mut self.stages[position].restarts, clock::now_ns(), is_refused);
         if after != After::Again {

@@ -1,11 +1,13 @@
 use std::collections::BTreeMap;
 
+use chain::{Mode, SUPERVISOR};
 use messages::Step;
 use runtime::page::{PageMap, Tier};
 use runtime::{Plan, SOURCE, ShellError, clock};
 use serde::{Deserialize, Serialize};
 use transport::Instance;
 
+use crate::executive::condition_name;
 use crate::processes::cpu_and_memory;
 
 /// A running chain at this moment.
@@ -49,6 +51,8 @@ pub struct StageStatus {
     pub state: String,
     /// Which build of the stage it is: `configured`, `built-in` or `stand-in`.
     pub tier: String,
+    /// What is the matter with it: dead, hung, spinning, slow, silent, flooding; well.
+    pub condition: String,
     /// Restarts so far.
     pub restarts: u64,
     /// Since its working thread last showed that it is alive [ms].
@@ -79,9 +83,6 @@ pub struct StageStatus {
     /// Parts that wait for it; null for the source.
     #[serde(default)]
     pub queue: Option<u64>,
-    /// `configured`, `built-in` or `stand-in`: which build of the stage its process is.
-    #[serde(default)]
-    pub tier: String,
     /// CPU time of its process [s]; null where none lives.
     #[serde(default)]
     pub cpu_s: Option<f64>,
@@ -107,6 +108,7 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
             pid: page.pid.get(),
             state: page.state().name().to_owned(),
             tier: Tier::from_number(page.tier.get()).name().to_owned(),
+            condition: condition_name(page.condition.get()).to_owned(),
             restarts: page.incarnation.get().saturating_sub(1),
             heartbeat_age_ms: clock::now_ns().saturating_sub(page.heartbeat_ns.get()) as f64 / 1e6,
             received: page.received.get(),
@@ -119,7 +121,6 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
             slips: page.slips.get(),
             late: page.late.get(),
             queue: published_before.map(|published: u64| published.saturating_sub(page.next_sequence.get())),
-            tier: Tier::from_number(page.tier.get()).name().to_owned(),
             cpu_s: used.map(|(cpu_s, _)| cpu_s),
             rss_mib: used.map(|(_, rss_kib)| rss_kib as f64 / 1024.0),
         });
@@ -129,6 +130,23 @@ pub fn status(instance: &Instance) -> Result<Status, ShellError> {
     let source = PageMap::open(&Plan::page_path(instance, SOURCE))?;
     let sweep = source.next_ordinal_out.get() / u64::from(sectors.max(1));
     let step = Step::from_number(source.step.get() as u32).name().to_owned();
-    let mode = "nominal".to_owned();
-    Ok(Status { instance: instance.name().to_owned(), mode, sweep, sectors, step, latency_ms, stages })
+    let own = PageMap::open(&Plan::page_path(instance, SUPERVISOR))?;
+    let mode = Mode::from_number(own.mode.get());
+    // The chain begins in its first mode: nobody asked for it.
+    let took_ns = own.mode_took_ns.get();
+    let mode_took_ms = (own.mode_asked_ns.get() == 0 || took_ns > 0).then_some(took_ns as f64 / 1e6);
+    Ok(Status {
+        instance: instance.name().to_owned(),
+        mode: mode.name().to_owned(),
+        mode_took_ms,
+        mode_changes: own.mode_changes.get(),
+        modes_late: own.modes_late.get(),
+        commands_accepted: own.commands_accepted.get(),
+        commands_refused: own.commands_refused.get(),
+        sweep,
+        sectors,
+        step,
+        latency_ms,
+        stages,
+    })
 }

@@ -78,7 +78,6 @@ impl Watch<'_> {
             Passed::Late(mode) => {
                 self.page.modes_late.add(1);
                 let text = format!("{} is not in effect after two sweeps", mode.name());
-                tracing::error!(mode = mode.name(), "a change of mode is late");
                 self.say(EventId::ModeLate, CHAIN, &text);
             }
         }
@@ -89,10 +88,6 @@ impl Watch<'_> {
         let is_new = !self.modes.is_safe();
         self.wish(Wish::Safe);
         if is_new {
-            // Whoever commands it knows; and a terminal that nobody reads must not fill up.
-            if by == By::Executive {
-                tracing::error!(reason, "safe mode");
-            }
             self.say(EventId::SafeEntered, CHAIN, reason);
         }
         let first_by_executive = self.safe_entered.as_ref().is_none_or(|safe| safe.by < by);
@@ -115,7 +110,7 @@ impl Watch<'_> {
         let sweeps = self.stages[0].page.published.get() / u64::from(self.plan.chain.sectors.max(1));
         let trouble = Trouble::of(self.stages.iter().map(|stage| &*stage.page));
         if let Some(step) = self.ladder.look(sweeps, trouble) {
-            self.note_move(step, "overload");
+            self.note_move(step);
         }
     }
 
@@ -126,12 +121,11 @@ impl Watch<'_> {
             return;
         }
         if let Some(step) = self.ladder.step_down(reason) {
-            self.note_move(step, "executive");
+            self.note_move(step);
         }
     }
 
-    fn note_move(&mut self, step: Move, cause: &str) {
-        tracing::warn!(cause, sweep = step.sweep, from = step.from, to = step.to, reason = step.reason, "step");
+    fn note_move(&mut self, step: Move) {
         let now = self.ladder.step();
         let id = if now > self.ladder_stood { EventId::StepTaken } else { EventId::StepReturned };
         self.ladder_stood = now;

@@ -3,13 +3,12 @@
 use std::path::Path;
 
 use chain::executive::EventsFile;
-use events::{Bounds, CHAIN, EventId, Happened, Log, LogError, Severity, Throttle};
+use events::{Bounds, EventId, Happened, Log, LogError, Severity, Throttle};
 use messages::Verdict;
 use runtime::page::{Heard, Page, Said};
 use runtime::{Plan, TAPE, clock};
 
 use crate::child::Ended;
-use crate::overload::Move;
 use crate::watch::Watch;
 
 /// Warnings of a kind that the terminal is told at once, and then in a second. The log has them all.
@@ -69,7 +68,7 @@ pub(crate) fn bounds(plan: &Plan) -> Bounds {
 }
 
 impl Watch<'_> {
-    /// Says that something happened to a process of the chain, or to [`CHAIN`].
+    /// Says that something happened to a process of the chain, or to [`events::CHAIN`].
     pub(crate) fn say(&mut self, id: EventId, stage: &str, text: &str) {
         let (time_ns, utc_ns, sweep) = (clock::now_ns(), clock::utc_ns(), self.sweep());
         self.put(&Happened { time_ns, utc_ns, id, stage, sweep, size: 0, text });
@@ -191,13 +190,6 @@ impl Watch<'_> {
     /// Says that a process was started in place of one that ended.
     pub(crate) fn tell_restart(&mut self, stage: &str, restarts: u64) {
         self.say(EventId::StageRestarted, stage, &format!("restart {restarts}"));
-    }
-
-    /// Says that the chain leaves out more, or less.
-    pub(crate) fn tell_step(&mut self, step: &Move, down: bool) {
-        let id = if down { EventId::StepTaken } else { EventId::StepReturned };
-        let Move { from, to, reason, .. } = step;
-        self.say(id, CHAIN, &format!("{from} to {to}: {reason}"));
     }
 }
 

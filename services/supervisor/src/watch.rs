@@ -18,9 +18,11 @@ use crate::budget::Restarts;
 use crate::child::Watched;
 use crate::commands::Refusals;
 use crate::control::Server;
+use crate::executive::{Executive, Signs};
 use crate::house::House;
 use crate::lives::Lives;
 use crate::machine::Machine;
+use crate::manager::Manager;
 use crate::modes::Modes;
 use crate::noise::Noise;
 use crate::overload::{Ladder, OverloadReport};
@@ -28,8 +30,9 @@ use crate::processes::Usage;
 use crate::progress::Progress;
 use crate::report::Report;
 use crate::services::Services;
-use crate::settle::settle;
 use crate::shared_memory::SharedMemory;
+use crate::steering::SafeReport;
+use crate::telling::{Ears, open_log};
 use crate::timeline::Timeline;
 
 /// Between two looks at the pages.
@@ -108,6 +111,12 @@ pub(crate) struct Watch<'a> {
     /// The supervisor's own page.
     pub(crate) page: PageMap,
     pub(crate) log: Log,
+    pub(crate) executive: Executive,
+    /// Of all processes at the last look, the tape's last.
+    pub(crate) signs: Vec<Signs>,
+    /// The sample that watched values were taken from last.
+    pub(crate) sampled_ns: u64,
+    pub(crate) manager: Manager,
     pub(crate) ears: Ears,
     // Services before the node: they are its guests.
     pub(crate) services: Services,
@@ -151,19 +160,18 @@ impl<'a> Watch<'a> {
     fn begin(house: &'a House, plan: &'a Plan, spawn: bool, signals: Receiver<i32>) -> Result<Self, SupervisorError> {
         let instance = house.instance();
         let node = Node::join(instance, "supervisor", plan.chain.queue_parts())?;
-        let services = Services::create(&node, plan)?;
-        let count = plan.stages().count();
-        let stages: Vec<Watched> =
-            (0..count).map(|position| Watched::new(instance, plan, position, spawn)).collect::<Result<_, _>>()?;
-        let tape = Tape::new(instance, plan, spawn)?;
-        let page = PageMap::create(&Plan::page_path(instance, SUPERVISOR))?;
-        page.pid.set(u64::from(std::process::id()));
+        let adopts = house.adopted();
+        let services = if adopts.is_some() { Services::reopen(&node, plan)? } else { Services::create(&node, plan)? };
+        let Household { stages, tape, page } = Household::of(house, plan, spawn)?;
         let log = open_log(plan, &Plan::events_path(instance))?;
         let beside = tape.iter().map(|tape: &Tape| &tape.process);
-        let ears = Ears::new(stages.iter().chain(beside).map(|process| &*process.page), &log);
+        let ears = Ears::new(stages.iter().chain(beside).map(|process: &Watched| &*process.page), &log);
         plan.write(instance)?;
         let now_ns = clock::now_ns();
+        let count = plan.stages().count();
+        let names = plan.stages().chain(plan.tape()).map(str::to_owned).collect();
         let budget = plan.chain.restart_budget;
+        let started_ns = page.run_began_ns.get();
         let mut watch = Self {
             executive: Executive::new(&plan.executive, names, plan.chain.sectors, now_ns),
             signs: Vec::new(),
@@ -175,6 +183,7 @@ impl<'a> Watch<'a> {
             tape,
             page,
             log,
+            manager: Manager::of_environment(),
             ears,
             services,
             node,
@@ -184,7 +193,7 @@ impl<'a> Watch<'a> {
             next_sample_ns: now_ns + SAMPLE_NS,
             usage: Usage::default(),
             shared_memory: SharedMemory::default(),
-            progress: Progress::new(now_ns, plan),
+            progress: Progress::new(started_ns, plan),
             ladder: Ladder::new(plan.chain.overload.clone()),
             ladder_stood: Step::Nominal,
             overload: OverloadReport::default(),
@@ -364,79 +373,13 @@ impl<'a> Watch<'a> {
             self.next_sample_ns = now_ns + SAMPLE_NS;
             self.sample();
         }
+        for order in self.watch_health() {
+            self.obey(&order)?;
+        }
+        self.tell_of_refusals(now_ns);
         self.look_for_files(now_ns);
         self.progress.show(now_ns, &self.stages);
         self.tell_manager();
         Ok(())
-    }
-
-    /// A stage's process has ended: settle its account and start its successor.
-    fn recover(&mut self, position: usize, ended: Ended) -> Result<(), SupervisorError> {
-        let lost_before = self.tell_death(position, ended);
-        if let Some(tape) = self.tape.as_ref().filter(|_| position == 0 || self.is_sink(position + 1)) {
-            tape.drain();
-        }
-        settle(&self.node, &self.services, &mut self.stages, position, ended);
-        self.tell_losses(position, lost_before);
-        let stage = &mut self.stages[position];
-        if stage.told {
-            return Ok(());
-        }
-        if ended == Ended::Code(CANNOT_START) {
-            if !self.begun {
-                return Err(SupervisorError::Refused(stage.name.clone()));
-            }
-            self.failed.get_or_insert(format!("stage {:?} could not start again: the chain was stopped", stage.name));
-            stage.told = true;
-            return Ok(());
-        }
-        if !stage.restarts.allow(clock::now_ns()) {
-            let budget = self.plan.chain.restart_budget;
-            self.failed.get_or_insert(format!(
-                "stage {:?} died more than {} times within {} s: the chain was stopped",
-                stage.name, budget.restarts, budget.window_s
-            ));
-            stage.told = true;
-            return Ok(());
-        }
-        stage.recovering = true;
-        self.timeline.restarted(clock::now_ns(), &stage.name, ended);
-        // A child inherits the seat of the one who starts it.
-        let for_the_child = self.as_before.as_ref().map(AsBefore::for_a_moment);
-        stage.start()?;
-        drop(for_the_child);
-        let (name, restarts) = (stage.name.clone(), stage.restarts.total);
-        self.tell_restart(&name, restarts);
-        Ok(())
-    }
-
-    /// A successor is connected: what was published before that and did not reach it is lost. It says so itself, once
-    /// it has looked; nobody waits for what will never come.
-    fn name_losses(&mut self, position: usize) {
-        if !self.stages[position].recovering || !self.stages[position].is_up() {
-            return;
-        }
-        self.stages[position].recovering = false;
-        if position > 0 {
-            let published = self.stages[position - 1].page.published.get();
-            self.stages[position].page.lose_below.set(published);
-            self.services.wake_readers_of(position - 1);
-        }
-    }
-
-    /// Tells the source how much of its work the chain is to leave out.
-    fn climb(&mut self) {
-        if self.plan.pace == Pace::Fast {
-            return;
-        }
-        let source = &self.stages[0].page;
-        let sweeps = source.published.get() / u64::from(self.plan.chain.sectors.max(1));
-        let trouble = Trouble::of(self.stages.iter().map(|stage| &*stage.page));
-        let before = self.ladder.step();
-        let Some(step) = self.ladder.look(sweeps, trouble) else { return };
-        source.step.set(self.ladder.step() as u64);
-        self.timeline.stepped(clock::now_ns(), &step);
-        self.tell_step(&step, self.ladder.step() > before);
-        self.overload.note(step);
     }
 }

@@ -41,8 +41,9 @@ impl<'a, S: Stage, B> Cycle<'a, S, B> {
     fn new(stage: S, shell: &'a Shell, outlet: Outlet<S::Output>, rebuild: B) -> Self {
         let deadline = Deadline::of(&shell.plan, &shell.name);
         let taken_by_others = Laps::of_this_thread();
+        let (arrivals, refused) = (Arrivals::new(shell), Refused::default());
         let tables = Tables::new(&shell.page, stage, shell.plan.kept_sweeps() as u64);
-        Self { tables, rebuild, shell, outlet, arrivals: Arrivals::new(shell), deadline, taken_by_others }
+        Self { tables, rebuild, shell, outlet, arrivals, deadline, refused, taken_by_others }
     }
 }
 
@@ -54,7 +55,7 @@ fn build<S>(shell: &Shell, rebuild: impl Fn(&Plan) -> Result<S, String>) -> Resu
 impl<S: Stage, B: Fn(&Plan) -> Result<S, String>> Reader<S::Input> for Cycle<'_, S, B> {
     /// One part: receive → in hand → process → send → published → counted → out of hand → release.
     fn take(&mut self, taken: &Taken<S::Input>) -> Result<(), ShellError> {
-        let Self { tables, rebuild, shell, outlet, arrivals, deadline, taken_by_others } = self;
+        let Self { tables, rebuild, shell, outlet, arrivals, deadline, refused, taken_by_others } = self;
         let page = &shell.page;
         let received_ns = clock::now_ns();
         let mut trace: Trace = *taken.trace();
@@ -101,6 +102,7 @@ impl<S: Stage, B: Fn(&Plan) -> Result<S, String>> Reader<S::Input> for Cycle<'_,
         page.count_sent(trace.part);
         page.count_verdict(verdict);
         page.put_down();
+        refused.note(page, &trace.part, verdict);
         if trace.part.is_last() {
             tables.sweep_ended();
         }

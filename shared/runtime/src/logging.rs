@@ -52,7 +52,7 @@ pub fn install(default_level: &str) {
         .with_ansi(false)
         .with_target(false)
         .with_timer(HostTime)
-        // A line that cannot be written (stderr is a file on a full disk) would be complained of on stderr, which panics.
+        // It would say on stderr that stderr is gone, and end a process whose terminal closed.
         .log_internal_errors(false)
         .finish();
     // Only tests install twice; the first stays.

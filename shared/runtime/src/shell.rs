@@ -6,6 +6,7 @@ use messages::Part;
 use rustix::fs::{FlockOperation, flock};
 use transport::{Instance, Node};
 
+use crate::guardian::Guardian;
 use crate::page::{PageMap, Said, State};
 use crate::{Plan, ShellError, Shutdown, clock};
 
@@ -129,7 +130,7 @@ impl Shell {
         self.page.say(Said { id, time_ns: clock::now_ns(), sweep, a: parts, b: ordinal });
     }
 
-    /// Whether it is time to leave: asked to, or nobody is left to ask.
+    /// Whether it is time to leave: asked to, or nobody has been left to ask for too long.
     pub(crate) fn leaving(&self) -> bool {
         self.shutdown.asked() || self.guardian.abandoned()
     }

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rustix::process::{Pid, getppid, test_kill_process};
+use rustix::process::{Pid, test_kill_process};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 
 use crate::ShellError;

@@ -5,9 +5,11 @@ use messages::{Trace, Verdict};
 use stage::{Settled, Sink};
 use transport::Taken;
 
+use crate::deadline::Deadline;
 use crate::page::Said;
 use crate::reader::{Arrivals, Reader, serve};
-use crate::{Shell, ShellError, clock, tables};
+use crate::refused::Refused;
+use crate::{Pace, Shell, ShellError, clock, tables};
 
 /// Time between two checkpoints [ns].
 const CHECKPOINT_NS: u64 = 1_000_000_000;
@@ -26,7 +28,8 @@ pub fn run_sink<K: Sink>(
     shell.running();
     let checkpoint_ns = clock::now_ns() + CHECKPOINT_NS;
     let (arrivals, refused) = (Arrivals::new(&shell), Refused::default());
-    let mut end = End { sink, shell: &shell, arrivals, refused, checkpoint_ns, failed_files: 0 };
+    let deadline = Deadline::of(&shell.plan, &shell.name);
+    let mut end = End { sink, shell: &shell, arrivals, deadline, refused, checkpoint_ns, failed_files: 0 };
     serve(&shell, &inlet, &mut end)?;
     let finished = end.sink.finish();
     end.tell_failures();
@@ -38,6 +41,7 @@ struct End<'a, K: Sink> {
     sink: K,
     shell: &'a Shell,
     arrivals: Arrivals<'a>,
+    deadline: Deadline,
     refused: Refused,
     checkpoint_ns: u64,
     /// Files of which it was said that they failed.

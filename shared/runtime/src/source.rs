@@ -1,19 +1,24 @@
 mod standing;
 
+use events::EventId;
 use messages::{Cutter, Hop, Part, Sweep, SweepHeader, Trace, Truth, Verdict};
 use stage::{Next, Source};
 use transport::{Loan, Outlet};
 
 use crate::kept::Kept;
-use crate::pacer::Pacer;
+use crate::pacer::{Pacer, is_step};
+use crate::page::Said;
 use crate::run_delay::Laps;
 use crate::window::Window;
 use crate::{Pace, Shell, ShellError, clock, tables};
+use standing::between_sweeps;
 
 /// Between two looks at the other pages while the window is shut [ns].
 const WINDOW_LOOK_NS: u64 = 100_000;
 /// Between two looks at the flags while there is nothing to do [ns].
 const LOOK_NS: u64 = 20_000_000;
+/// Sensor time that leaps ahead by less is a gap in the recording [ns].
+const LEAP_NS: u64 = 5_000_000_000;
 
 /// The main loop of the source. Returns when it was asked to leave; at the end of the data it waits for that, because
 /// what it has sent lives in its shared memory, and may have to be sent again.
@@ -30,15 +35,15 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
     while !(shell.leaving() && out.is_between_sweeps()) {
         tables::acknowledge(&shell.page);
         out.go_back_if_asked();
-        if !out.has_sweep() && !out.make(&mut source)? {
-            out.tell_end();
-            shell.page.set_state(State::Ended);
-            wait_while(shell, LOOK_NS, || !out.is_asked_back());
-            if !shell.leaving() {
-                shell.page.set_state(State::Running);
+        out.pause_if_asked(&mut source);
+        let next = if out.has_sweep() { Next::Sweep } else { out.make(&mut source)? };
+        match next {
+            Next::Sweep if !out.send()? => break,
+            Next::Sweep | Next::Nothing => {}
+            Next::End => {
+                out.tell_end();
+                out.wait_at_the_end();
             }
-        } else if !out.send()? {
-            break;
         }
     }
     shell.left();
@@ -49,7 +54,7 @@ pub fn run_source<S: Source>(mut source: S, shell: &Shell) -> Result<(), ShellEr
 fn wait_while(shell: &Shell, look_ns: u64, holds: impl Fn() -> bool) {
     while holds() && !shell.leaving() {
         tables::acknowledge(&shell.page);
-        shell.page.beat(clock::now_ns());
+        shell.beat();
         clock::sleep_ns(look_ns);
     }
 }
@@ -165,7 +170,7 @@ impl<'a> Out<'a> {
         let (ahead_ns, back_ns) =
             (header.sensor_time_ns.saturating_sub(due_ns), due_ns.saturating_sub(header.sensor_time_ns));
         // Key frames of a recording may lie far apart; a sensor's turns are never the same to the nanosecond.
-        if ahead_ns > LEAP_NS.max(10 * header.period_ns) || back_ns > header.period_ns {
+        if ahead_ns > LEAP_NS.max(10 * header.period_ns) || back_ns >= header.period_ns {
             self.say(EventId::ClockStep, ahead_ns / 1_000_000, back_ns / 1_000_000);
         }
     }
@@ -183,11 +188,15 @@ impl<'a> Out<'a> {
         let mut began_ns = clock::now_ns();
         let shell = self.shell;
         let (made, next) = self.kept.make(source, || {
-            shell.page.beat(clock::now_ns());
+            shell.beat();
             between_sweeps(shell);
             !shell.leaving() && shell.page.pause.get() == 0
         })?;
         self.shell.slow_down(Part { sectors: 1, ..Part::default() });
+        self.shell.toil(began_ns);
+        if next == Next::Sweep {
+            note_step(shell, &mut self.before, &made.whole.header);
+        }
         match next {
             Next::Sweep if is_over(self.shell, &made.whole.header) => return Ok(Next::End),
             Next::Sweep => {}
@@ -210,7 +219,7 @@ impl<'a> Out<'a> {
         made.step = self.shell.page.step.get() as u32;
         self.kept.keep();
         self.tell_clock(&header);
-        Ok(true)
+        Ok(Next::Sweep)
     }
 
     /// One part: room → in hand → cut → due → sent → published → out of hand. False when asked to leave before: a sweep
@@ -264,7 +273,7 @@ impl<'a> Out<'a> {
             if sector == 0 {
                 between_sweeps(shell);
             }
-            shell.shutdown.orphaned() || (sector == 0 && (shell.leaving() || self.is_to_pause()))
+            sector == 0 && (shell.leaving() || self.is_to_pause())
         });
         if clock::now_ns() < due_ns {
             shell.page.put_down();
@@ -351,7 +360,7 @@ fn is_over(shell: &Shell, header: &SweepHeader) -> bool {
     shell.plan.duration_ns.is_some_and(|duration_ns| passed_ns > duration_ns)
 }
 
-/// Says that the sensor's clock was set, where it was, and moves the run's beginning with it: an hour's step is no hour of
+/// Where the sensor's clock was set, moves the run's beginning with it: an hour's step is no hour of
 /// the run.
 fn note_step(shell: &Shell, before: &mut Option<SweepHeader>, header: &SweepHeader) {
     let Some(last) = before.replace(*header) else { return };
@@ -365,7 +374,4 @@ fn note_step(shell: &Shell, before: &mut Option<SweepHeader>, header: &SweepHead
         // 0 means that there is none.
         began.set(began.get().wrapping_add(now_ns.wrapping_sub(expected_ns)).max(1));
     }
-    let (a, b) = (now_ns.abs_diff(expected_ns) / 1_000_000, u64::from(now_ns < expected_ns));
-    let sweep = shell.page.next_ordinal_out.get() / u64::from(shell.plan.chain.sectors.max(1));
-    shell.page.say(Said { id: EventId::ClockStep, time_ns: clock::now_ns(), sweep, a, b });
 }

@@ -7,7 +7,7 @@ use crate::{Shell, ShellError, run_stage};
 /// The main loop of a stand-in for stage `S`, which could not be kept running: every part passes empty, rejected as
 /// [`Verdict::RejectedDown`], so that each is still answered and accounted for.
 pub fn run_stand_in<S: Stage>(shell: &Shell) -> Result<(), ShellError> {
-    run_stage(StandIn::<S>(PhantomData), shell)
+    run_stage(StandIn::<S>(PhantomData), shell, |_| Ok(StandIn(PhantomData)))
 }
 
 struct StandIn<S>(PhantomData<S>);

@@ -3,7 +3,7 @@ use messages::{Clusters, Descriptors, Detections, Message, Order, Place, Sweep, 
 use stage::Tap;
 use transport::Node;
 
-use crate::page::{Page, PageMap};
+use crate::page::{Page, PageMap, Said};
 use crate::{Pace, Plan, SOURCE, Shell, ShellError, clock, realtime, tables};
 
 /// Between two looks into the queues where the source waits for what is found [ns].

@@ -156,6 +156,15 @@ impl Executive {
     }
 }
 
+/// The word of what a page says is the matter with a stage.
+pub(crate) fn condition_name(number: u64) -> &'static str {
+    number.checked_sub(1).and_then(|place| CONDITIONS.get(place as usize)).map_or("well", |condition| word(*condition))
+}
+
+/// All conditions, by their number.
+const CONDITIONS: [Condition; 6] =
+    [Condition::Dead, Condition::Hung, Condition::Spinning, Condition::Slow, Condition::Silent, Condition::Flooding];
+
 /// The word of a condition in events and reasons.
 pub(crate) fn word(condition: Condition) -> &'static str {
     match condition {

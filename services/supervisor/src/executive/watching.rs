@@ -18,6 +18,10 @@ impl Watch<'_> {
         let flow = self.flow();
         self.gather(now_ns, flow);
         let findings = self.executive.look(now_ns, &self.signs, flow);
+        for (place, stage) in self.stages.iter().enumerate() {
+            let condition = self.executive.condition(place);
+            stage.page.condition.set(condition.map_or(0, |condition| condition as u64 + 1));
+        }
         let mut orders = Vec::new();
         for finding in findings {
             self.say_finding(&finding);
@@ -36,7 +40,7 @@ impl Watch<'_> {
         Flow {
             period_ns: source.map_or(0, |source| source.period_ns.get()),
             paced: self.plan.pace == Pace::Realtime,
-            flows: self.begun && !source_is_idle(self.plan, &self.stages, tape),
+            flows: self.begun && !source_is_idle(&self.plan, &self.stages, tape),
         }
     }
 
@@ -53,7 +57,7 @@ impl Watch<'_> {
         // The tape has no part that it owes to anybody: it can be hung, spinning or dead.
         self.signs.extend(tape.map(|tape| Signs { idle: true, ..Signs::of(tape, None, now_ns, asked_ns) }));
         if let Some(sink) = self.stages.last() {
-            self.executive.take_sweep(now_ns, self.plan, &sink.page);
+            self.executive.take_sweep(now_ns, &self.plan, &sink.page);
         }
         if self.begun && self.sampled_ns != self.next_sample_ns {
             self.sampled_ns = self.next_sample_ns;
@@ -70,6 +74,8 @@ impl Watch<'_> {
 
     fn say_finding(&mut self, finding: &Finding) {
         match finding {
+            // A death is said with how it came, by whoever settles it.
+            Finding::Began(_, Condition::Dead, _) => {}
             Finding::Began(place, condition, evidence) => {
                 let id = event_of(*condition);
                 self.say(id, &self.name_at(*place), &evidence.to_string());

@@ -227,6 +227,8 @@ pub struct Page {
     pub pause: Word,
     /// A [`Tier`]: which build of the stage the next life is.
     pub tier: Word,
+    /// One more than the number of a `chain::executive::Condition`: what is the matter with the stage; 0 = nothing.
+    pub condition: Word,
     /// Generation of the parameters in the plan; where it is higher than `table_active` the stage reads the plan again.
     pub table_wanted: Word,
     /// The first sweep that is to be processed with them.
