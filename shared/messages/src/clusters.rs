@@ -113,7 +113,7 @@ pub struct Clusters {
 }
 
 impl Message for Clusters {
-    const TYPE: &'static str = "encke.Clusters.3";
+    const TYPE: &'static str = "encke.Clusters.4";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

@@ -64,7 +64,7 @@ pub struct Descriptors {
 }
 
 impl Message for Descriptors {
-    const TYPE: &'static str = "encke.Descriptors.3";
+    const TYPE: &'static str = "encke.Descriptors.4";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

@@ -43,7 +43,7 @@ pub struct Detections {
 }
 
 impl Message for Detections {
-    const TYPE: &'static str = "encke.Detections.3";
+    const TYPE: &'static str = "encke.Detections.4";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

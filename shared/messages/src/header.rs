@@ -1,5 +1,7 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
+use crate::EgoMotion;
+
 /// Why a recorded return is no return to the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
@@ -60,6 +62,8 @@ pub struct SweepHeader {
     /// Bound on how far returns stray from their columns [rad], positive, where the sweep may be cut (see
     /// [`crate::Cutter`]); 0 where it may not, and all of it travels in its last sector.
     pub stray_rad: f32,
+    /// How the sensor itself moved, where the source knows.
+    pub ego: EgoMotion,
 }
 
 impl SweepHeader {

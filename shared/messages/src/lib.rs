@@ -9,13 +9,14 @@
 //! use zerocopy::FromZeros;
 //! let sweep = Sweep::new_box_zeroed().unwrap(); // tests only; stages get shared memory
 //! assert!(sweep.returns.is_empty());
-//! assert_eq!(Clusters::TYPE, "encke.Clusters.3");
+//! assert_eq!(Clusters::TYPE, "encke.Clusters.4");
 //! ```
 
 mod bounded;
 mod clusters;
 mod descriptors;
 mod detections;
+mod ego;
 mod header;
 mod joiner;
 mod order;
@@ -25,12 +26,14 @@ mod solids;
 mod step;
 mod sweep;
 mod trace;
+mod tracks;
 mod truth;
 
 pub use bounded::{Bounded, Full};
 pub use clusters::{Cell, CellKind, Cluster, ClusterSummary, Clusters, MAX_CELLS, MAX_CLUSTERS};
 pub use descriptors::{Bin, Descriptor, Descriptors, MAX_BINS, MIN_FEATURE_POINTS};
 pub use detections::{Detection, Detections};
+pub use ego::EgoMotion;
 pub use header::{Refusal, SweepHeader};
 pub use joiner::Joiner;
 pub use order::{Order, Place};
@@ -40,6 +43,10 @@ pub use solids::{Fit, MAX_FITS, RELIEF, SOLID_PARAMETERS, Solid, SolidFit};
 pub use step::Step;
 pub use sweep::Sweep;
 pub use trace::{Hop, MAX_HOPS, Part, Trace, Verdict};
+pub use tracks::{
+    ClosestApproach, MAX_TRACK_KEYS, MAX_TRACKS, Propagated, Stale, TRACK_COVARIANCE, Track, TrackState, TrackTable,
+    Tracks,
+};
 pub use truth::{MAX_TRUTH_OBJECTS, NO_OBJECT, SolidKind, Truth, TruthObject};
 
 use zerocopy::{FromZeros, Immutable, KnownLayout};

@@ -3,7 +3,7 @@
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, TryFromBytes};
 
-use crate::{Bounded, Clusters, Descriptors, Detections, Message, Sweep, Trace};
+use crate::{Bounded, Clusters, Descriptors, Detections, Message, Sweep, Trace, TrackTable};
 
 /// A message that recordings hold without loss, under the name of its [`Message::TYPE`].
 pub trait Raw: Message {
@@ -142,6 +142,22 @@ impl Raw for Detections {
     }
 }
 
+impl Raw for TrackTable {
+    fn write_raw(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(self.time_ns.as_bytes());
+        put(out, &self.tracks);
+        put(out, &self.keys);
+    }
+
+    fn read_raw(&mut self, bytes: &[u8]) -> Result<(), RawError> {
+        let mut bytes = Reader { bytes, at: 0 };
+        self.time_ns = bytes.one()?;
+        bytes.checked(&mut self.tracks)?;
+        bytes.plain(&mut self.keys)?;
+        bytes.end()
+    }
+}
+
 impl Trace {
     /// Appends the trace's bytes to `out`.
     pub fn write_raw(&self, out: &mut Vec<u8>) {
@@ -227,7 +243,7 @@ mod tests {
     use zerocopy::FromZeros;
 
     use super::*;
-    use crate::{Bin, Cell, CellKind, Cluster, Descriptor, Detection, Fit, Solid};
+    use crate::{Bin, Cell, CellKind, Cluster, Descriptor, Detection, Fit, Solid, Track, TrackState};
 
     fn sweep() -> Box<Sweep> {
         let mut sweep = Sweep::new_box_zeroed().unwrap();
@@ -283,6 +299,13 @@ mod tests {
         let mut again = Descriptors::new_box_zeroed().unwrap();
         again.read_raw(&bytes(&*message)).unwrap();
         assert_eq!((bytes(&*again), again.fits[0].hits), (bytes(&*message), 6));
+        let mut message = TrackTable::new_box_zeroed().unwrap();
+        message.time_ns = 8;
+        message.tracks.push(Track { state: TrackState::Coasting, keys: 1, ..Track::default() }).unwrap();
+        message.keys.push(17).unwrap();
+        let mut again = TrackTable::new_box_zeroed().unwrap();
+        again.read_raw(&bytes(&*message)).unwrap();
+        assert_eq!((bytes(&*again), again.keys_of(&again.tracks[0])), (bytes(&*message), &[17][..]));
     }
 
     #[test]

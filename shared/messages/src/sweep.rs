@@ -35,7 +35,7 @@ impl Sweep {
 }
 
 impl Message for Sweep {
-    const TYPE: &'static str = "encke.Sweep.2";
+    const TYPE: &'static str = "encke.Sweep.3";
 
     fn clear(&mut self) {
         self.header = SweepHeader::default();

@@ -66,11 +66,13 @@ pub enum Verdict {
     RejectedAhead = 9,
     /// The stage could not be kept running: a stand-in answers for it.
     RejectedDown = 10,
+    /// New obstacles were left out: the tracker had its most already.
+    PartialTracks = 11,
 }
 
 impl Verdict {
     /// All verdicts, by their number.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Complete,
         Self::PartialCells,
         Self::RejectedIncomplete,
@@ -82,6 +84,7 @@ impl Verdict {
         Self::RejectedDouble,
         Self::RejectedAhead,
         Self::RejectedDown,
+        Self::PartialTracks,
     ];
 
     /// Whether the part counts as rejected in the ledger.
@@ -113,6 +116,7 @@ impl Verdict {
             Self::RejectedDouble => "double",
             Self::RejectedAhead => "ahead",
             Self::RejectedDown => "down",
+            Self::PartialTracks => "partial_tracks",
         }
     }
 }
