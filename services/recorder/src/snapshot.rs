@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use lidar::ObstacleClass;
@@ -12,6 +12,9 @@ use crate::latency::LatencySnapshot;
 use crate::stage_stats::Verdicts;
 use crate::timeline::TimelineSnapshot;
 use crate::worst::{WorstSweep, merge};
+
+/// What is written at a time [bytes].
+const BUFFER_BYTES: usize = 1 << 16;
 
 /// Version of the file's layout.
 pub const VERSION: u32 = 3;
@@ -176,10 +179,11 @@ impl Snapshot {
     pub fn write(&self, path: &Path) -> Result<(), SnapshotError> {
         let mut beside = path.as_os_str().to_owned();
         beside.push(".new");
-        let json =
-            serde_json::to_vec(self).map_err(|source| SnapshotError::Content { path: path.to_owned(), source })?;
         let file = |source| SnapshotError::File { path: path.to_owned(), source };
-        fs::write(&beside, json).map_err(file)?;
+        // Written as it is made: the text of a long run is megabytes, once a second.
+        let mut out = BufWriter::with_capacity(BUFFER_BYTES, File::create(&beside).map_err(file)?);
+        serde_json::to_writer(&mut out, self).map_err(|source| file(source.into()))?;
+        out.flush().map_err(file)?;
         fs::rename(&beside, path).map_err(file)
     }
 

@@ -127,33 +127,39 @@ impl Timeline {
     pub(crate) fn snapshot_into(&self, snapshot: &mut TimelineSnapshot, stages: usize) {
         snapshot.bucket_ns = self.buckets.width_ns();
         snapshot.first_ns = self.first_ns.unwrap_or(0);
-        snapshot.buckets.clear();
+        let mut used = 0;
         for (begin_ns, bucket) in self.buckets.iter() {
-            if snapshot.buckets.is_empty() {
+            if used == 0 {
                 snapshot.begin_ns = begin_ns;
             }
-            snapshot.buckets.push(bucket.snapshot(stages));
+            if used == snapshot.buckets.len() {
+                snapshot.buckets.push(BucketSnapshot::with_room());
+            }
+            bucket.snapshot_into(&mut snapshot.buckets[used], stages);
+            used += 1;
         }
+        snapshot.buckets.truncate(used);
     }
 }
 
 impl Bucket {
-    fn snapshot(&self, stages: usize) -> BucketSnapshot {
-        let bins = self.bins.iter().zip(0_u32..).filter(|(count, _)| **count > 0);
-        BucketSnapshot {
-            sweeps: self.sweeps,
-            misses: self.misses,
-            missing: self.missing,
-            max_ns: self.max_ns,
-            source_late_ns: self.source_late_ns,
-            spent_ns: if self.sweeps > 0 { self.spent_ns[..stages.min(MAX_HOPS)].to_vec() } else { Vec::new() },
-            detections: if self.detections.iter().any(|&count| count > 0) {
-                self.detections.to_vec()
-            } else {
-                Vec::new()
-            },
-            bins: bins.map(|(&count, place)| [place, count]).collect(),
+    fn snapshot_into(&self, snapshot: &mut BucketSnapshot, stages: usize) {
+        snapshot.sweeps = self.sweeps;
+        snapshot.misses = self.misses;
+        snapshot.missing = self.missing;
+        snapshot.max_ns = self.max_ns;
+        snapshot.source_late_ns = self.source_late_ns;
+        snapshot.spent_ns.clear();
+        if self.sweeps > 0 {
+            snapshot.spent_ns.extend_from_slice(&self.spent_ns[..stages.min(MAX_HOPS)]);
         }
+        snapshot.detections.clear();
+        if self.detections.iter().any(|&count| count > 0) {
+            snapshot.detections.extend_from_slice(&self.detections);
+        }
+        let bins = self.bins.iter().zip(0_u32..).filter(|(count, _)| **count > 0);
+        snapshot.bins.clear();
+        snapshot.bins.extend(bins.map(|(&count, place)| [place, count]));
     }
 
     fn of(snapshot: &BucketSnapshot) -> Self {
@@ -225,6 +231,16 @@ fn is_zero(number: &u64) -> bool {
 }
 
 impl BucketSnapshot {
+    /// An empty one with room for what a bucket usually holds: latencies of three octaves.
+    fn with_room() -> Self {
+        Self {
+            spent_ns: Vec::with_capacity(MAX_HOPS),
+            detections: Vec::with_capacity(ObstacleClass::ALL.len()),
+            bins: Vec::with_capacity(3 << FINE_BITS),
+            ..Self::default()
+        }
+    }
+
     /// The latency that the share `quantile` of the answered sweeps reach not beyond [ns], to 3.1 %; exact where that is
     /// the longest; none without answers.
     pub fn quantile_ns(&self, quantile: f64) -> Option<u64> {
