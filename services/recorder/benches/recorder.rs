@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use common::{HandMade, Sut, settings, start};
 use criterion::{BatchSize, Criterion};
+use messages::Tracks;
 use recorder::Settings;
 use stage::Sink;
+use zerocopy::FromZeros;
 
 fn wait_until_settled(recorder: &Sut, parts: u64) {
     while recorder.settled() < parts {
@@ -21,6 +23,8 @@ fn wait_until_settled(recorder: &Sut, parts: u64) {
 
 fn bench(c: &mut Criterion) {
     let (mut trace, detections) = HandMade::interleaved(0, 50_000, 400, 100).whole();
+    let mut message = Tracks::new_box_zeroed().unwrap();
+    message.detections.copy_from(&detections);
     let folder = tempfile::tempdir().unwrap();
     let mut bench = |name: &str, of: Settings| {
         let mut recorder = start(of).unwrap();
@@ -33,7 +37,7 @@ fn bench(c: &mut Criterion) {
                 |()| {
                     trace.part.sweep = parts.get();
                     parts.set(parts.get() + 1);
-                    recorder.borrow_mut().accept(&trace, &detections)
+                    Sink::accept(&mut **recorder.borrow_mut(), &trace, &message)
                 },
                 BatchSize::PerIteration,
             );
@@ -42,7 +46,7 @@ fn bench(c: &mut Criterion) {
             b.iter(|| {
                 trace.part.sweep = parts;
                 parts += 1;
-                let verdict = recorder.accept(&trace, &detections);
+                let verdict = Sink::accept(&mut *recorder, &trace, &message);
                 wait_until_settled(&recorder, parts);
                 verdict
             });
@@ -58,6 +62,7 @@ fn bench(c: &mut Criterion) {
     // Not lossless: that would measure the trace's writer.
     bench("trace to nowhere", Settings { trace: Some("/dev/null".into()), lossless: false, ..settings() });
     bench("detections file", Settings { detections: file("a"), ..settings() });
+    bench("tracks file", Settings { tracks: file("d"), ..settings() });
     bench("both files", Settings { detections: file("b"), labels: file("c"), ..settings() });
 }
 

@@ -3,7 +3,7 @@
 //! Parts come in order of their ordinals. A sweep ends with its last sector, or unfinished when a part of another
 //! sweep follows. Members are indices in the whole sweep; only their places, and those of solids, are rebased.
 
-use messages::{Detection, Part, Refusal, Solid};
+use messages::{Detection, Part, Refusal, Solid, Track};
 
 use crate::part_rows::PartRows;
 
@@ -26,6 +26,11 @@ pub(crate) struct SweepRows {
     pub(crate) members: Vec<u32>,
     /// In the order in which they came: a detection knows its place.
     pub(crate) solids: Vec<Solid>,
+    /// Time of the tracks, which come with the last part [ns]; 0 where there are none.
+    pub(crate) tracks_ns: u64,
+    pub(crate) tracks: Vec<Track>,
+    /// Keys of the clusters that tracks were seen as: track after track.
+    pub(crate) keys: Vec<u32>,
 }
 
 impl SweepRows {
@@ -36,11 +41,13 @@ impl SweepRows {
     }
 
     fn begin(&mut self, part: Part) {
-        let Self { detections, members, solids, .. } = std::mem::take(self);
-        *self = Self { part, detections, members, solids, ..Self::default() };
+        let Self { detections, members, solids, tracks, keys, .. } = std::mem::take(self);
+        *self = Self { part, detections, members, solids, tracks, keys, ..Self::default() };
         self.detections.clear();
         self.members.clear();
         self.solids.clear();
+        self.tracks.clear();
+        self.keys.clear();
     }
 
     fn add(&mut self, rows: &PartRows) {
@@ -61,6 +68,16 @@ impl SweepRows {
         }));
         self.members.extend_from_slice(&rows.members);
         self.solids.extend_from_slice(&rows.solids);
+        if rows.tracks_ns > 0 {
+            self.tracks_ns = rows.tracks_ns;
+            self.tracks.clone_from(&rows.tracks);
+            self.keys.clone_from(&rows.keys);
+        }
+    }
+
+    /// A cluster's number: the rank of its key. None for a key of no cluster.
+    pub(crate) fn cluster_of(&self, key: u32) -> Option<usize> {
+        self.detections.binary_search_by_key(&key, |detection| detection.summary.key).ok()
     }
 }
 
@@ -134,6 +151,9 @@ mod tests {
             detections: keys.iter().enumerate().map(detection).collect(),
             members: keys.to_vec(),
             solids: keys.iter().filter(|&&key| has_solid(key)).map(solid).collect(),
+            tracks_ns: 0,
+            tracks: Vec::new(),
+            keys: Vec::new(),
         }
     }
 

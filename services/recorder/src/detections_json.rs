@@ -96,13 +96,11 @@ struct Row {
 
 impl Row {
     fn new(cluster: usize, detection: &Detection, solid: Option<&Solid>) -> Self {
-        let [rectangular, ellipsoidal, cylindrical, conical] = detection.posterior;
-        let posterior = Posterior { rectangular, ellipsoidal, cylindrical, conical };
         Self {
             cluster,
             points: detection.summary.points,
             class: detection.class,
-            posterior: detection.class.solid_index().map(|_| posterior),
+            posterior: detection.class.solid_index().map(|_| Posterior::from(detection.posterior)),
             centroid_m: detection.summary.centroid_m,
             centre_m: solid.map(|solid| solid.centre_m),
             size_m: solid.map(|solid| solid.size_m),
@@ -118,12 +116,19 @@ fn centre_covariance_m2(solid: &Solid) -> [f32; 9] {
     std::array::from_fn(|place| solid.covariance_of(place / 3, place % 3))
 }
 
+/// Probabilities by the names of their classes.
 #[derive(Serialize)]
-struct Posterior {
+pub(crate) struct Posterior {
     rectangular: f32,
     ellipsoidal: f32,
     cylindrical: f32,
     conical: f32,
+}
+
+impl From<[f32; 4]> for Posterior {
+    fn from([rectangular, ellipsoidal, cylindrical, conical]: [f32; 4]) -> Self {
+        Self { rectangular, ellipsoidal, cylindrical, conical }
+    }
 }
 
 #[cfg(test)]

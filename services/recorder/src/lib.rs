@@ -1,4 +1,4 @@
-//! The chain's ledgered sink: one JSON line of detections a sweep, one CSV row of labels a return, and the latency
+//! The chain's ledgered sink: one JSON line of detections and one of tracks a sweep, one CSV row of labels a return, and the latency
 //! statistics of every hop.
 //!
 //! [`Recorder`] copies each part into a buffer and hands it to one writer thread; a slow or full disk costs rows,
@@ -8,13 +8,14 @@
 //! use std::sync::Arc;
 //! use std::sync::atomic::{AtomicU64, Ordering};
 //!
-//! use messages::{Detections, Trace};
+//! use messages::{Trace, Tracks};
 //! use recorder::{Recorder, Settings, Snapshot};
 //! use stage::Sink;
 //! use zerocopy::FromZeros;
 //!
 //! let settings = Settings {
 //!     detections: Some("/dev/null".into()),
+//!     tracks: None,
 //!     labels: None,
 //!     trace: None,
 //!     statistics: None,
@@ -25,13 +26,13 @@
 //!     paced: false,
 //!     rate: 1.0,
 //!     deadline_ms: 100.0,
-//!     stages: vec!["simulator".into(), "clusterer".into(), "extractor".into(), "classifier".into()],
+//!     stages: vec!["simulator".into(), "clusterer".into(), "extractor".into(), "classifier".into(), "tracker".into()],
 //! };
 //! let settled = Arc::new(AtomicU64::new(0));
 //! let counter = Arc::clone(&settled);
 //! let tell = Arc::new(move |_part| _ = counter.fetch_add(1, Ordering::Release));
 //! let mut recorder = Recorder::start(settings, tell)?;
-//! let empty = Detections::new_box_zeroed().unwrap(); // tests only; stages get shared memory
+//! let empty = Tracks::new_box_zeroed().unwrap(); // tests only; stages get shared memory
 //! assert!(!recorder.accept(&Trace::default(), &empty).is_rejected());
 //! recorder.finish()?;
 //! assert_eq!(settled.load(Ordering::Acquire), 1);
@@ -41,6 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod alerts;
 mod answers;
 mod assemble;
 mod buckets;
@@ -64,6 +66,7 @@ mod sweeps;
 mod timeline;
 mod trace_events;
 mod trace_file;
+mod tracks_json;
 mod worst;
 mod writer;
 

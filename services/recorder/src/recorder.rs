@@ -4,12 +4,12 @@ use std::sync::atomic::Ordering;
 use std::thread::{Builder, JoinHandle};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use messages::{Detections, Order, Place, Trace, Verdict};
-use stage::{Settled, Sink, SinkError};
+use messages::{Order, Place, Trace, Tracks, Verdict};
+use stage::{Alert, Settled, Sink, SinkError};
 
+use crate::alerts::Alerts;
 use crate::output::{Commit, Failure, Output};
-use crate::part_rows::{PartRows, is_coherent};
-use crate::repair::Whole;
+use crate::part_rows::{PartRows, Wanted, is_coherent};
 use crate::settings::{RecorderError, Settings};
 use crate::snapshot::Snapshot;
 use crate::stats::Statistics;
@@ -18,7 +18,7 @@ use crate::trace_file::TraceLine;
 use crate::writer::{Progress, Writer};
 use crate::{repair, repair_trace};
 
-/// The chain's ledgered sink: detections and labels as files, latencies as statistics.
+/// The chain's ledgered sink: detections, tracks and labels as files, latencies as statistics.
 ///
 /// Dropping it without [`Sink::finish`] does not wait: the writer ends by itself when it has written what it was given.
 pub struct Recorder {
@@ -31,7 +31,8 @@ pub struct Recorder {
     lossless: bool,
     /// Where the source sends again what was lost.
     order: Option<Order>,
-    with_members: bool,
+    wanted: Wanted,
+    alerts: Alerts,
     finished: bool,
     statistics_file: Option<PathBuf>,
     /// Memory that is used again for every checkpoint.
@@ -46,7 +47,7 @@ struct Line {
 }
 
 impl Recorder {
-    /// Opens the files, allocates every buffer and starts the writer threads: one for detections and labels, one for the
+    /// Opens the files, allocates every buffer and starts the writer threads: one for detections, tracks and labels, one for the
     /// trace file, each where there is such a file.
     ///
     /// With `resume`, what a killed process left torn at a file's end is cut, and writing goes on from there.
@@ -58,15 +59,15 @@ impl Recorder {
         settings.check()?;
         let statistics = Statistics::new(&settings)?;
         let progress = Arc::new(Progress::new(settled));
-        let Outputs { detections, labels, trace, last_sweep } = open_outputs(&settings)?;
+        let Outputs { detections, tracks, labels, trace, last_sweep } = open_outputs(&settings)?;
         let in_files = last_sweep.map_or(0, |last| last.saturating_add(1));
         let trace = trace.map(|output| TraceLine::start(output, &settings.stages, settings.lossless)).transpose()?;
-        let with_members = labels.is_some();
-        let line = if detections.is_none() && labels.is_none() {
+        let wanted = Wanted { members: labels.is_some(), tracks: tracks.is_some() };
+        let line = if detections.is_none() && wanted == Wanted::default() {
             None
         } else {
-            let writer = Writer { detections, labels, progress: Arc::clone(&progress) };
-            Some(Line::start(writer, settings.queue_parts, with_members)?)
+            let writer = Writer { detections, tracks, labels, progress: Arc::clone(&progress) };
+            Some(Line::start(writer, settings.queue_parts, wanted)?)
         };
         Ok(Self {
             statistics,
@@ -75,7 +76,8 @@ impl Recorder {
             progress,
             lossless: settings.lossless,
             order: settings.in_order_from.map(|first| Order::from_sweep(first.max(in_files))),
-            with_members,
+            wanted,
+            alerts: Alerts::new(),
             finished: false,
             statistics_file: settings.statistics,
             snapshot: Snapshot::default(),
@@ -86,11 +88,12 @@ impl Recorder {
     pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         self.statistics.snapshot_into(snapshot);
         snapshot.lost_sweeps.detections = self.progress.lost_detections.load(Ordering::Relaxed);
+        snapshot.lost_sweeps.tracks = self.progress.lost_tracks.load(Ordering::Relaxed);
         snapshot.lost_sweeps.labels = self.progress.lost_labels.load(Ordering::Relaxed);
         snapshot.trace = self.trace.as_ref().map(TraceLine::counts);
     }
 
-    fn take(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+    fn take(&mut self, trace: &Trace, input: &Tracks) -> Verdict {
         if !is_coherent(trace, input) {
             return Verdict::RejectedMalformed;
         }
@@ -103,7 +106,7 @@ impl Recorder {
         };
         let buffer = if self.lossless { line.free.recv().ok() } else { line.free.try_recv().ok() };
         let Some(mut rows) = buffer else { return Verdict::RejectedSinkFull };
-        rows.fill(trace, input, self.with_members);
+        rows.fill(trace, input, self.wanted);
         // The queue holds as many parts as there are buffers, so only a dead writer refuses.
         match line.queue.try_send(rows) {
             Ok(()) => Verdict::Complete,
@@ -113,12 +116,12 @@ impl Recorder {
 }
 
 impl Line {
-    fn start(writer: Writer, parts: usize, with_members: bool) -> Result<Self, RecorderError> {
+    fn start(writer: Writer, parts: usize, wanted: Wanted) -> Result<Self, RecorderError> {
         let (queue, queued) = bounded(parts);
         let (freed, free) = bounded(parts);
         for _ in 0..parts {
             // Cannot fail: there is room for all, and `free` is alive.
-            let _ = freed.try_send(Box::new(PartRows::reserved(with_members)));
+            let _ = freed.try_send(Box::new(PartRows::reserved(wanted)));
         }
         let writer = Builder::new()
             .name("recorder-writer".to_owned())
@@ -129,13 +132,14 @@ impl Line {
 }
 
 impl Sink for Recorder {
-    type Input = Detections;
+    type Input = Tracks;
 
     /// Counts the part, copies its rows into a free buffer and passes it on. Never waits unless `lossless`.
     ///
-    /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members or solids out of place.
+    /// [`Verdict::RejectedSinkFull`]: no buffer is free. [`Verdict::RejectedMalformed`]: members, solids or keys out of place.
     /// [`Verdict::RejectedDouble`] and [`Verdict::RejectedAhead`]: see [`Settings::in_order_from`].
-    fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+    fn accept(&mut self, trace: &Trace, input: &Tracks) -> Verdict {
+        self.alerts.clear();
         match self.order.as_mut().map(|order| order.take(trace)) {
             Some(Place::Double) => return Verdict::RejectedDouble,
             Some(Place::Ahead) => return Verdict::RejectedAhead,
@@ -144,7 +148,10 @@ impl Sink for Recorder {
             Some(Place::Next) | None => {}
         }
         let verdict = self.take(trace, input);
-        let answer = self.statistics.add(trace, input, verdict);
+        if verdict == Verdict::Complete {
+            self.alerts.note(&input.table);
+        }
+        let answer = self.statistics.add(trace, &input.detections, verdict);
         if let Some(line) = &self.trace {
             line.send(Traced { trace: *trace, answer });
         }
@@ -152,18 +159,23 @@ impl Sink for Recorder {
     }
 
     /// Counts the part, and writes its sweep without it. Never waits.
-    fn refuse(&mut self, trace: &Trace, input: &Detections, verdict: Verdict) -> Verdict {
-        let answer = self.statistics.add(trace, input, verdict);
+    fn refuse(&mut self, trace: &Trace, input: &Tracks, verdict: Verdict) -> Verdict {
+        self.alerts.clear();
+        let answer = self.statistics.add(trace, &input.detections, verdict);
         if let Some(line) = &self.trace {
             line.send(Traced { trace: *trace, answer });
         }
         let line = self.line.as_ref().filter(|_| !self.finished);
         if let Some((line, mut rows)) = line.and_then(|line| Some((line, line.free.try_recv().ok()?))) {
-            rows.fill_refused(trace, &input.header);
+            rows.fill_refused(trace, &input.detections.header);
             // Only a dead writer refuses; then no sweep is written.
             let _ = line.queue.try_send(rows);
         }
         verdict
+    }
+
+    fn alerts(&self) -> &[Alert] {
+        self.alerts.begun()
     }
 
     fn wanted_attempt(&self) -> u32 {
@@ -171,7 +183,7 @@ impl Sink for Recorder {
     }
 
     fn failed_files(&self) -> u64 {
-        let lost = [&self.progress.lost_detections, &self.progress.lost_labels];
+        let lost = [&self.progress.lost_detections, &self.progress.lost_tracks, &self.progress.lost_labels];
         let trace = self.trace.as_ref().is_some_and(|trace| trace.counts().failed);
         lost.into_iter().filter(|lost| lost.load(Ordering::Relaxed) > 0).count() as u64 + u64::from(trace)
     }
@@ -207,6 +219,7 @@ impl Sink for Recorder {
 /// The files of the settings.
 struct Outputs {
     detections: Option<Output>,
+    tracks: Option<Output>,
     labels: Option<Output>,
     trace: Option<Output>,
     /// The last sweep that an earlier life has written.
@@ -214,21 +227,31 @@ struct Outputs {
 }
 
 fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
-    let (mut whole, mut labelled) = (None, None);
+    // In the order in which they are written, backwards: whoever has a sweep's last file has the sweep.
+    let mut written = None;
     let detections = settings.detections.as_deref().map(|path| match settings.resume {
         false => Output::create(path, Commit::LastByte),
         true => Output::resume(path, Commit::LastByte, |file| {
-            let found = repair::detections(path, file)?;
-            whole = Some(found);
+            let found = repair::lines(path, file, "detections", None)?;
+            written = Some(found);
             Ok(found.length)
         }),
     });
     let detections = detections.transpose()?;
+    let tracks = settings.tracks.as_deref().map(|path| match settings.resume {
+        false => Output::create(path, Commit::LastByte),
+        true => Output::resume(path, Commit::LastByte, |file| {
+            let found = repair::lines(path, file, "tracks", written)?;
+            written.get_or_insert(found);
+            Ok(found.length)
+        }),
+    });
+    let tracks = tracks.transpose()?;
     let labels = settings.labels.as_deref().map(|path| match settings.resume {
         false => Output::create(path, Commit::FirstByte),
         true => Output::resume(path, Commit::FirstByte, |file| {
-            let found = repair::labels(path, file, whole)?;
-            labelled = found.last_sweep;
+            let found = repair::labels(path, file, written)?;
+            written.get_or_insert(found);
             Ok(found.length)
         }),
     });
@@ -238,17 +261,21 @@ fn open_outputs(settings: &Settings) -> Result<Outputs, RecorderError> {
         true => Output::resume(path, Commit::LastByte, |file| repair_trace::trace(path, file)),
     });
     let trace = trace.transpose()?;
-    let is_same = |one: &Option<Output>, other: &Option<Output>| {
-        one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one.is_same_file(other))
-    };
-    if is_same(&detections, &labels) {
-        return Err(RecorderError::SameFile(settings.labels.clone().unwrap_or_default()));
+    let all = [
+        (&detections, &settings.detections),
+        (&tracks, &settings.tracks),
+        (&labels, &settings.labels),
+        (&trace, &settings.trace),
+    ];
+    for (place, (later, path)) in all.iter().enumerate() {
+        let is_same = |(earlier, _): &(&Option<Output>, _)| {
+            earlier.as_ref().zip(later.as_ref()).is_some_and(|(earlier, later)| earlier.is_same_file(later))
+        };
+        if all[..place].iter().any(is_same) {
+            return Err(RecorderError::SameFile((*path).clone().unwrap_or_default()));
+        }
     }
-    if is_same(&detections, &trace) || is_same(&labels, &trace) {
-        return Err(RecorderError::SameFile(settings.trace.clone().unwrap_or_default()));
-    }
-    let last_sweep = whole.map_or(labelled, |whole: Whole| whole.last_sweep);
-    Ok(Outputs { detections, labels, trace, last_sweep })
+    Ok(Outputs { detections, tracks, labels, trace, last_sweep: written.and_then(|whole| whole.last_sweep) })
 }
 
 fn tell(failures: &[Failure]) -> String {

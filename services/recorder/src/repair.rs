@@ -1,8 +1,8 @@
 //! Finds how far a file of an earlier life is whole, reading no more than its last sweep.
 //!
-//! Detections: a line is whole when it ends. Labels: a sweep's rows are whole when their first byte is not NUL
-//! (see [`crate::output::Commit`]). The labels of a sweep are written before its detections, so the one sweep of which
-//! there are labels and no line was under way; it is cut, too, and both files name the same sweeps.
+//! Detections and tracks: a line is whole when it ends. Labels: a sweep's rows are whole when their first byte is not NUL
+//! (see [`crate::output::Commit`]). Of a sweep labels are written first, then tracks, then detections, so the one sweep that
+//! an earlier file has and a later one lacks was under way; it is cut, too, and all files name the same sweeps.
 
 use std::fs::File;
 use std::io;
@@ -22,36 +22,67 @@ pub(crate) struct Whole {
     pub(crate) last_sweep: Option<u64>,
 }
 
-/// How far the file of detections is whole.
-pub(crate) fn detections(path: &Path, file: &File) -> Result<Whole, RecorderError> {
-    #[derive(Deserialize)]
-    struct Line {
-        sweep: u64,
-    }
+/// How far a file of lines, one a sweep, is whole. `written` is what is whole of a file that is written after it: one sweep
+/// more than that was under way.
+pub(crate) fn lines(
+    path: &Path,
+    file: &File,
+    kind: &'static str,
+    written: Option<Whole>,
+) -> Result<Whole, RecorderError> {
     let mut span = FIRST_SPAN;
     loop {
         let (from, tail) = read_tail(path, file, span)?;
         let Some(end) = after_last_newline(&tail) else {
             if from == 0 {
-                return not_begun(path, "detections", &tail, |torn| torn.starts_with(b"{"));
+                return not_begun(path, kind, &tail, |torn| torn.starts_with(b"{"));
             }
             span *= 2;
             continue;
         };
-        let Some(begin) = after_last_newline(&tail[..end - 1]).or((from == 0).then_some(0)) else {
+        let Some((begin, sweep)) = last_line(path, kind, &tail[..end], from == 0)? else {
             span *= 2;
             continue;
         };
-        let line = &tail[begin..end];
-        let Ok(Line { sweep }) = serde_json::from_slice(line) else {
-            return Err(foreign(path, "detections", line));
+        let whole = Whole { length: from + end as u64, last_sweep: Some(sweep) };
+        if written.is_none_or(|written| written.last_sweep >= whole.last_sweep) {
+            return Ok(whole);
+        }
+        if begin == 0 && from == 0 {
+            return Ok(Whole::default());
+        }
+        let Some((_, before)) = last_line(path, kind, &tail[..begin], from == 0)? else {
+            span *= 2;
+            continue;
         };
-        return Ok(Whole { length: from + end as u64, last_sweep: Some(sweep) });
+        // More than one sweep beyond: the other file has failed, this one has not.
+        let is_under_way = written.is_some_and(|written| Some(before) <= written.last_sweep);
+        return Ok(if is_under_way { Whole { length: from + begin as u64, last_sweep: Some(before) } } else { whole });
     }
 }
 
-/// How far the file of labels is whole. `detections` is what is whole of the detections, where they are written too.
-pub(crate) fn labels(path: &Path, file: &File, detections: Option<Whole>) -> Result<Whole, RecorderError> {
+/// Where the last of these whole lines begins, and its sweep; none where it begins before what was read.
+fn last_line(
+    path: &Path,
+    kind: &'static str,
+    lines: &[u8],
+    at_begin: bool,
+) -> Result<Option<(usize, u64)>, RecorderError> {
+    #[derive(Deserialize)]
+    struct Line {
+        sweep: u64,
+    }
+    let before = lines.len().saturating_sub(1);
+    let Some(begin) = after_last_newline(&lines[..before]).or(at_begin.then_some(0)) else { return Ok(None) };
+    let line = &lines[begin..];
+    match serde_json::from_slice(line) {
+        Ok(Line { sweep }) => Ok(Some((begin, sweep))),
+        Err(_) => Err(foreign(path, kind, line)),
+    }
+}
+
+/// How far the file of labels is whole. `written` is what is whole of a file that is written after it.
+pub(crate) fn labels(path: &Path, file: &File, written: Option<Whole>) -> Result<Whole, RecorderError> {
     let (_, head) = read_from(path, file, 0, HEADER.len() as u64)?;
     if head != HEADER {
         return not_begun(path, "labels", &head, |torn| HEADER.starts_with(torn) || TORN_HEADER.starts_with(torn));
@@ -63,8 +94,8 @@ pub(crate) fn labels(path: &Path, file: &File, detections: Option<Whole>) -> Res
             Scan::Foreign(line) => return Err(foreign(path, "labels", line)),
             Scan::More => span *= 2,
             Scan::Found { end, last, before_last } => {
-                return Ok(match (last, detections) {
-                    // More than one sweep beyond the detections: those have failed, the labels have not.
+                return Ok(match (last, written) {
+                    // More than one sweep beyond: the other file has failed, this one has not.
                     (Some((sweep, begin)), Some(line))
                         if Some(sweep) > line.last_sweep && before_last <= line.last_sweep =>
                     {

@@ -11,6 +11,8 @@ pub const MAX_QUEUE_PARTS: usize = 2048;
 pub struct Settings {
     /// File for one JSON line a sweep; `-` and `/dev/stdout` are standard output.
     pub detections: Option<PathBuf>,
+    /// File for one JSON line of tracks a sweep; as above.
+    pub tracks: Option<PathBuf>,
     /// File for one CSV row a recorded return; as above.
     pub labels: Option<PathBuf>,
     /// File for the way of every part in the Trace Event Format (a JSON array); as above.
@@ -64,13 +66,13 @@ pub enum RecorderError {
     Foreign {
         /// As given.
         path: PathBuf,
-        /// What the file should hold: "detections", "labels" or "a trace".
+        /// What the file should hold: "detections", "tracks", "labels" or "a trace".
         kind: &'static str,
         /// Beginning of the line that does not fit.
         found: String,
     },
     /// Two outputs would overwrite each other.
-    #[error("two of detections, labels and trace are {}, must be files of their own", .0.display())]
+    #[error("two of detections, tracks, labels and trace are {}, must be files of their own", .0.display())]
     SameFile(PathBuf),
     /// The number of buffers is out of range.
     #[error("queue_parts is {0}, must be 1 to {MAX_QUEUE_PARTS}")]
@@ -129,6 +131,7 @@ mod tests {
     fn sut() -> Settings {
         Settings {
             detections: Some("a".into()),
+            tracks: None,
             labels: Some("b".into()),
             trace: Some("c".into()),
             statistics: None,

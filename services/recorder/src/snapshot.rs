@@ -17,7 +17,7 @@ use crate::worst::{WorstSweep, merge};
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// The recorder's statistics at one moment: of one life of its process, or merged, of several.
 ///
@@ -102,6 +102,8 @@ pub struct TraceCounts {
 pub struct LostSweeps {
     /// Of the detections' file.
     pub detections: u64,
+    /// Of the tracks' file.
+    pub tracks: u64,
     /// Of the labels' file.
     pub labels: u64,
 }
@@ -243,6 +245,7 @@ impl Snapshot {
         add(&mut self.detections, &later.detections);
         add(&mut self.verdicts, &later.verdicts);
         self.lost_sweeps.detections += later.lost_sweeps.detections;
+        self.lost_sweeps.tracks += later.lost_sweeps.tracks;
         self.lost_sweeps.labels += later.lost_sweeps.labels;
         self.end_to_end.merge(&later.end_to_end);
         answers::merge(

@@ -11,23 +11,27 @@ use crate::detections_json::write_line;
 use crate::labels_csv::{HEADER, Labels};
 use crate::output::{Failure, Output};
 use crate::part_rows::PartRows;
+use crate::tracks_json;
 
 /// What the writer has done so far: for the other thread to read, and whom to tell.
 pub(crate) struct Progress {
     pub(crate) settled: Settled,
     pub(crate) lost_detections: AtomicU64,
+    pub(crate) lost_tracks: AtomicU64,
     pub(crate) lost_labels: AtomicU64,
 }
 
 impl Progress {
     pub(crate) fn new(settled: Settled) -> Self {
-        Self { settled, lost_detections: AtomicU64::new(0), lost_labels: AtomicU64::new(0) }
+        let none = || AtomicU64::new(0);
+        Self { settled, lost_detections: none(), lost_tracks: none(), lost_labels: none() }
     }
 }
 
 /// Owns the files.
 pub(crate) struct Writer {
     pub(crate) detections: Option<Output>,
+    pub(crate) tracks: Option<Output>,
     pub(crate) labels: Option<Output>,
     pub(crate) progress: Arc<Progress>,
 }
@@ -57,16 +61,24 @@ impl Writer {
         if let Some(sweep) = assembly.end() {
             self.write(sweep, &mut format);
         }
-        [self.labels, self.detections].into_iter().flatten().filter_map(Output::end).collect()
+        [self.labels, self.tracks, self.detections].into_iter().flatten().filter_map(Output::end).collect()
     }
 
-    /// Labels first: the line says that the sweep is written (see [`crate::repair`]).
+    /// Labels, tracks, detections: the last of them that is written says that the sweep is (see [`crate::repair`]).
     fn write(&mut self, sweep: &SweepRows, format: &mut Format) {
         if let Some(output) = &mut self.labels {
             format.bytes.clear();
             format.labels.write_rows(sweep, &mut format.bytes);
             if !output.append(sweep.part.sweep, &format.bytes) {
                 self.progress.lost_labels.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        if let Some(output) = &mut self.tracks {
+            format.bytes.clear();
+            let formatted = tracks_json::write_line(sweep, &mut format.bytes);
+            debug_assert!(formatted.is_ok(), "writing to memory cannot fail");
+            if !output.append(sweep.part.sweep, &format.bytes) {
+                self.progress.lost_tracks.fetch_add(1, Ordering::Relaxed);
             }
         }
         if let Some(output) = &mut self.detections {

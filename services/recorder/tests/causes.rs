@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use common::{settings, start};
 use messages::{Detections, Hop, Part, Trace, Verdict};
 use recorder::Snapshot;
-use stage::Sink;
 use zerocopy::FromZeros;
 
 const MS: u64 = 1_000_000;

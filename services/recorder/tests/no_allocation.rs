@@ -10,7 +10,6 @@ use common::{HandMade, settings, start};
 use messages::Verdict;
 use recorder::{Settings, Snapshot};
 use rustix::fs::{CWD, Mode, OFlags, mkfifoat};
-use stage::Sink;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
 #[global_allocator]

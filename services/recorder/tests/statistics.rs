@@ -11,7 +11,6 @@ use lidar::ObstacleClass;
 use messages::{ClusterSummary, Detection, Detections, Hop, Part, Trace, Verdict};
 use proptest::prelude::*;
 use recorder::{LatencySnapshot, Recorder, Settings, Snapshot};
-use stage::Sink;
 use zerocopy::FromZeros;
 
 const MS: u64 = 1_000_000;
@@ -358,7 +357,7 @@ fn a_snapshot_comes_back_from_its_file() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
     assert!(Snapshot::read(&folder.path().join("none")).unwrap_err().to_string().contains("none"));
     Snapshot { version: 9, ..written }.write(&path).unwrap();
-    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 3"));
+    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 4"));
     std::fs::write(&path, "{").unwrap();
     assert!(Snapshot::read(&path).unwrap_err().to_string().contains("is no snapshot"));
 }

@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use common::{settings, start};
+use common::{Sut, settings, start};
 use messages::{Detections, Hop, Part, Trace, Verdict};
 use recorder::{Recorder, RecorderError, Settings, Snapshot, TraceCounts};
 use serde_json::Value;
@@ -187,7 +187,7 @@ fn message() -> Box<Detections> {
     message
 }
 
-fn accept(recorder: &mut Recorder, traces: &[Trace]) {
+fn accept(recorder: &mut Sut, traces: &[Trace]) {
     let message = message();
     for trace in traces {
         assert_eq!(recorder.accept(trace, &message), Verdict::Complete);

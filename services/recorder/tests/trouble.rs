@@ -10,13 +10,13 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use common::{HandMade, lines, settings, start};
+use common::{HandMade, Sut, lines, settings, start};
 use messages::Verdict;
 use recorder::{Recorder, Settings, Snapshot};
 use rustix::fs::{CWD, Mode, OFlags, mkfifoat};
 use stage::Sink;
 
-fn accept(recorder: &mut Recorder, sweep: u64) -> Verdict {
+fn accept(recorder: &mut Sut, sweep: u64) -> Verdict {
     let (trace, detections) = HandMade::interleaved(sweep, 4_000, 100, 100).whole();
     recorder.accept(&trace, &detections)
 }

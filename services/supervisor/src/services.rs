@@ -1,5 +1,5 @@
 use chain::SUPERVISOR;
-use messages::{Clusters, Descriptors, Detections, Sweep, Truth};
+use messages::{Clusters, Descriptors, Detections, Sweep, Tracks, Truth};
 use runtime::Plan;
 use transport::{Node, Reopened, ServiceHold};
 
@@ -21,6 +21,7 @@ impl Services {
                 "Clusters" => node.create::<Clusters>()?,
                 "Descriptors" => node.create::<Descriptors>()?,
                 "Detections" => node.create::<Detections>()?,
+                "Tracks" => node.create::<Tracks>()?,
                 _ => return Err(unknown(stage, message)),
             });
         }
@@ -35,6 +36,7 @@ impl Services {
                 "Clusters" => node.reopen::<Clusters>()?,
                 "Descriptors" => node.reopen::<Descriptors>()?,
                 "Detections" => node.reopen::<Detections>()?,
+                "Tracks" => node.reopen::<Tracks>()?,
                 _ => return Err(unknown(stage, message)),
             });
         }

@@ -20,7 +20,7 @@ pub struct Chain {
     pub sectors: u32,
     /// Sweeps that wait for a slow reader before the oldest part is dropped.
     pub queue_sweeps: usize,
-    /// From the last return of a sweep to its last detection [ms].
+    /// From the last return of a sweep to its last message [ms].
     pub deadline_ms: f64,
     /// Age of a part after its last return at which nobody may act on it any more [ms].
     pub allowed_age_ms: f64,
@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn the_shipped_chain_holds() {
         let chain = ChainFile::parse(SHIPPED).unwrap().checked().unwrap();
-        assert_eq!(chain.stages.len(), 4);
+        assert_eq!(chain.stages.len(), 5);
         assert_eq!(chain.sink(), "recorder");
     }
 
@@ -346,7 +346,7 @@ mod tests {
         assert!(refused("budget_ms = 60.0", "budget_ms = 0.0").contains("stage.budget_ms is 0"));
         assert!(refused("budget_ms = 60.0", "").contains(r#"stage "extractor" has no budget_ms"#));
         assert!(
-            refused(r#"reads = "Detections""#, "reads = \"Detections\"\nbudget_ms = 1.0").contains("has a budget_ms")
+            refused(r#"reads = "Tracks""#, "reads = \"Tracks\"\nbudget_ms = 1.0").contains("has a budget_ms")
         );
         assert!(refused("allowed_age_ms = 1000.0", "allowed_age_ms = 99.0").contains("at most allowed_age_ms = 99"));
     }

@@ -42,6 +42,18 @@ pub struct Detections {
     pub solids: Bounded<Solid, MAX_FITS>,
 }
 
+impl Detections {
+    /// Makes these detections the same as others.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        self.header = other.header;
+        // As large as the others: all fit.
+        let _ = self.detections.extend_from_slice(&other.detections);
+        let _ = self.members.extend_from_slice(&other.members);
+        let _ = self.solids.extend_from_slice(&other.solids);
+    }
+}
+
 impl Message for Detections {
     const TYPE: &'static str = "encke.Detections.4";
 

@@ -95,8 +95,10 @@ pub struct Track {
     pub state: TrackState,
     /// The likeliest class over all sweeps.
     pub class: ObstacleClass,
+    /// 1 as long as it is likelier to be met than the tracker's parameters allow.
+    pub alert: u8,
     /// Fills the struct to a multiple of its alignment.
-    pub reserved: [u8; 2],
+    pub reserved: u8,
 }
 
 /// Where a track is at some time, and how well that is known.

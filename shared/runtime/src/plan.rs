@@ -90,6 +90,8 @@ pub enum Pace {
 pub struct Outputs {
     /// Detections, one JSON line a sweep.
     pub detections: Option<PathBuf>,
+    /// Tracks, one JSON line a sweep.
+    pub tracks: Option<PathBuf>,
     /// Labels, one CSV row a return.
     pub labels: Option<PathBuf>,
     /// The way of every part in the Trace Event Format.

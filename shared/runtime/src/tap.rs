@@ -1,5 +1,5 @@
 use events::EventId;
-use messages::{Clusters, Descriptors, Detections, Message, Order, Place, Sweep, Trace, Truth};
+use messages::{Clusters, Descriptors, Message, Order, Place, Sweep, Trace, Tracks, Truth};
 use stage::Tap;
 use transport::Node;
 
@@ -82,7 +82,7 @@ struct Topics {
     truths: Topic<Truth>,
     clusters: Option<Topic<Clusters>>,
     descriptors: Option<Topic<Descriptors>>,
-    detections: Topic<Detections>,
+    tracks: Topic<Tracks>,
     /// A sweep has ended since the last checkpoint, and the source waits for it.
     ended: bool,
     /// Where nothing may be lost.
@@ -100,7 +100,7 @@ impl Topics {
             truths: Topic::open(node, None)?,
             clusters: clusters.then(|| Topic::open(node, None)).transpose()?,
             descriptors: descriptors.then(|| Topic::open(node, None)).transpose()?,
-            detections: Topic::open(node, order)?,
+            tracks: Topic::open(node, order)?,
             ended: false,
             stall: if lossless { Some(Stall::new(shell)?) } else { None },
             look_ns: 0,
@@ -125,7 +125,7 @@ impl Topics {
     /// busiest, and what this process does on the other core slows them down.
     fn next_look_ns(&self, shell: &Shell) -> u64 {
         let now_ns = clock::now_ns();
-        let (due_ns, period_ns) = self.detections.ended;
+        let (due_ns, period_ns) = self.tracks.ended;
         if shell.plan.pace == Pace::Fast {
             return now_ns + LOOK_NS;
         }
@@ -150,9 +150,9 @@ impl Topics {
             if let Some(descriptors) = &mut self.descriptors {
                 any |= descriptors.take(tap, shell, T::descriptors)?;
             }
-            let before = self.detections.ended_sweeps();
-            any |= self.detections.take(tap, shell, T::detections)?;
-            self.ended |= self.detections.ended_sweeps() > before;
+            let before = self.tracks.ended_sweeps();
+            any |= self.tracks.take(tap, shell, T::tracks)?;
+            self.ended |= self.tracks.ended_sweeps() > before;
             if !any && !self.ended {
                 if let Some(stall) = &mut self.stall {
                     stall.look(page, sectors);
@@ -160,7 +160,7 @@ impl Topics {
                 self.look_ns = self.next_look_ns(shell);
                 return Ok(());
             }
-            let wanted = self.sweeps.wanted_attempt().max(self.detections.wanted_attempt());
+            let wanted = self.sweeps.wanted_attempt().max(self.tracks.wanted_attempt());
             page.wanted_attempt.set(page.wanted_attempt.get().max(wanted.into()));
             if !any && std::mem::take(&mut self.ended) {
                 keep(tap, shell);

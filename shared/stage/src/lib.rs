@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
 
-use messages::{Clusters, Descriptors, Detections, Sweep, Trace, Truth};
+use messages::{Clusters, Descriptors, Sweep, Trace, Tracks, Truth};
 pub use messages::{Message, Part, Verdict};
 
 /// One room of the chain. Touches no clock, file, thread or IPC.
@@ -26,6 +26,9 @@ pub trait Stage: Sized {
 
     /// Fills `output`, which arrives empty. Never allocates, panics or fails: a bad part is a [`Verdict`].
     fn process(&mut self, part: Part, input: &Self::Input, output: &mut Self::Output) -> Verdict;
+
+    /// Fills `output`, which arrives empty, where the room itself cannot be kept running: with what passes it unchanged.
+    fn pass_by(_input: &Self::Input, _output: &mut Self::Output) {}
 }
 
 /// Where sweeps come from.
@@ -78,7 +81,7 @@ pub trait Tap {
     fn sweep(&mut self, trace: &Trace, part: &Sweep, utc_ns: u64);
 
     /// Takes a part from the last stage.
-    fn detections(&mut self, trace: &Trace, part: &Detections, utc_ns: u64);
+    fn tracks(&mut self, trace: &Trace, part: &Tracks, utc_ns: u64);
 
     /// Whether parts between the stages are wanted, too: of the clusterer, of the extractor.
     fn wants_between(&self) -> (bool, bool) {
@@ -126,6 +129,11 @@ pub trait Sink {
     /// used, and its sweep is not whole. Gives the verdict back; [`Settled`] is not told.
     fn refuse(&mut self, trace: &Trace, input: &Self::Input, verdict: Verdict) -> Verdict;
 
+    /// What began to be too near with the part that was accepted last.
+    fn alerts(&self) -> &[Alert] {
+        &[]
+    }
+
     /// The attempt ([`Part::attempt`]) that is needed because parts are missing, where parts are sent again; else 0.
     fn wanted_attempt(&self) -> u32 {
         0
@@ -141,6 +149,17 @@ pub trait Sink {
 
     /// Finishes every accepted part and closes the files.
     fn finish(&mut self) -> Result<(), SinkError>;
+}
+
+/// A track that has become likelier to be met than is allowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Alert {
+    /// Number of the track.
+    pub track: u64,
+    /// When it comes closest [s].
+    pub time_s: f32,
+    /// How likely it is met, 0 to 1.
+    pub collision_probability: f32,
 }
 
 /// What a sink could not finish: one line that names file and remedy.

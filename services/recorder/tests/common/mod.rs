@@ -9,18 +9,37 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use lidar::ObstacleClass;
-use messages::{ClusterSummary, Detection, Detections, Hop, MAX_FITS, Part, Solid, Trace};
+use messages::{ClusterSummary, Detection, Detections, Hop, MAX_FITS, Message, Part, Solid, Trace, Tracks, Verdict};
 use recorder::{Recorder, RecorderError, Settings};
 use serde::Deserialize;
+use stage::Sink;
 use zerocopy::FromZeros;
 
 /// A recorder and the count of what it has settled.
 pub struct Sut {
     recorder: Recorder,
     settled: Arc<AtomicU64>,
+    /// Detections as the recorder takes them.
+    message: Box<Tracks>,
 }
 
 impl Sut {
+    /// Takes detections among which nothing is tracked.
+    pub fn accept(&mut self, trace: &Trace, input: &Detections) -> Verdict {
+        self.fill(input);
+        self.recorder.accept(trace, &self.message)
+    }
+
+    pub fn refuse(&mut self, trace: &Trace, input: &Detections, verdict: Verdict) -> Verdict {
+        self.fill(input);
+        self.recorder.refuse(trace, &self.message, verdict)
+    }
+
+    fn fill(&mut self, input: &Detections) {
+        self.message.clear();
+        self.message.detections.copy_from(input);
+    }
+
     pub fn settled(&self) -> u64 {
         self.settled.load(Ordering::Acquire)
     }
@@ -45,13 +64,14 @@ pub fn start(settings: Settings) -> Result<Sut, RecorderError> {
     let settled = Arc::new(AtomicU64::new(0));
     let counter = Arc::clone(&settled);
     let tell = Arc::new(move |_part| _ = counter.fetch_add(1, Ordering::Release));
-    Ok(Sut { recorder: Recorder::start(settings, tell)?, settled })
+    Ok(Sut { recorder: Recorder::start(settings, tell)?, settled, message: Tracks::new_box_zeroed().unwrap() })
 }
 
 /// Settings without files.
 pub fn settings() -> Settings {
     Settings {
         detections: None,
+        tracks: None,
         labels: None,
         trace: None,
         statistics: None,

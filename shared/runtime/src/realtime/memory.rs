@@ -4,7 +4,7 @@ use std::fs;
 use std::hint::black_box;
 
 use chain::Chain;
-use messages::{Clusters, Descriptors, Detections, Sweep, Truth};
+use messages::{Clusters, Descriptors, Detections, Sweep, Tracks, Truth};
 use rustix::mm::{MlockAllFlags, mlockall, munlockall};
 use rustix::process::{Resource, getrlimit};
 use rustix::thread::CapabilitySet;
@@ -30,6 +30,7 @@ pub fn segment_of(message: &str, queue_parts: usize) -> Option<Segment> {
         "Clusters" => Segment::of::<Clusters>(queue_parts),
         "Descriptors" => Segment::of::<Descriptors>(queue_parts),
         "Detections" => Segment::of::<Detections>(queue_parts),
+        "Tracks" => Segment::of::<Tracks>(queue_parts),
         _ => return None,
     })
 }
@@ -142,10 +143,10 @@ mod tests {
 
     #[test]
     fn every_message_of_the_chain_has_a_bill() {
-        for message in ["Sweep", "Truth", "Clusters", "Descriptors", "Detections"] {
+        for message in ["Sweep", "Truth", "Clusters", "Descriptors", "Detections", "Tracks"] {
             assert!(segment_of(message, 4).unwrap().virtual_bytes() > 0, "{message}");
         }
-        assert!(segment_of("Tracks", 4).is_none());
+        assert!(segment_of("Parties", 4).is_none());
     }
 
     #[test]
