@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use chain::executive::EventsFile;
-use events::{Bounds, EventId, Happened, Log, LogError, Severity, Throttle};
+use events::{Bounds, Danger, EventId, Happened, Log, LogError, Severity, Throttle};
 use messages::Verdict;
 use runtime::page::{Heard, Page, Said};
 use runtime::{Plan, TAPE, clock};
@@ -198,6 +198,7 @@ fn words(said: &Said) -> String {
     let Said { id, a, b, .. } = *said;
     let reason = usize::try_from(b).ok().and_then(|number| Verdict::ALL.get(number).copied());
     match (id, reason) {
+        (EventId::CollisionAlert, _) => format!("track {a}: {}", Danger::from_number(b)),
         (EventId::PartsRejected, Some(reason)) => format!("{a} parts: {}", reason.name()),
         // The supervisor's own events have no text; a stage that says one nevertheless is quoted.
         _ if id.entry().text.is_empty() => format!("{a}, {b}"),
@@ -215,6 +216,7 @@ fn size(id: EventId, a: u64, b: u64) -> u64 {
         | EventId::BudgetOverrun
         | EventId::DeadlineMissed => a,
         EventId::ClockStep => a.max(b),
+        EventId::CollisionAlert => b,
         _ => 0,
     }
 }
@@ -230,6 +232,8 @@ mod tests {
         assert_eq!(words(&said(EventId::PartsRejected, 3, incomplete)), "3 parts: incomplete");
         assert_eq!(words(&said(EventId::PartsRejected, 3, 99)), "3 parts, reason 99");
         assert_eq!(words(&said(EventId::BudgetOverrun, 25_000, 20_000)), "busy for 25000 µs of 20000");
+        let danger = Danger::of(0.5, 2.0).to_number();
+        assert_eq!(words(&said(EventId::CollisionAlert, 7, danger)), "track 7: met with a probability of 50 % in 2 s");
         assert_eq!(words(&said(EventId::RunBegan, 1, 2)), "1, 2");
     }
 

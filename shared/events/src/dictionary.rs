@@ -124,9 +124,12 @@ dictionary! {
     FileRotated = 602, Info, "file_rotated", "file {a} of the recording is begun", "The recording goes on in the next file.";
     SharedMemoryGone = 603, Error, "shared_memory_gone", "", "Somebody deleted files of the chain in shared memory: whoever starts later could not join. The chain is stopped in order; start it again.";
 
-    // 7xx: what the source sends
+    // 7xx: what the source sends, and what is in it
     SourceEnded = 701, Info, "source_ended", "after sweep {a}", "The recording, or what was asked for, has come to its end.";
     ClockStep = 702, Warning, "clock_step", "sensor time leapt {a} ms ahead, {b} ms back", "Sensor time went back or leapt ahead; the sweeps go on.";
+
+    CollisionAlert = 703, Warning, "collision_alert", "track {a}, {b}",
+        "An obstacle is likelier to be met within the horizon than the tracker's parameters allow. Said once, until that has passed.";
 
     // 8xx: faults on purpose
     FaultInjected = 801, Info, "fault_injected", "fault {a} of the catalogue, by {b}", "Somebody put a fault into the chain with `encke inject`.";

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use events::EventId;
+use events::{Danger, EventId};
 use messages::{Trace, Verdict};
 use stage::{Settled, Sink};
 use transport::Taken;
@@ -55,6 +55,10 @@ impl<K: Sink> End<'_, K> {
         let (page, now_ns) = (&self.shell.page, clock::now_ns());
         page.sent_ns.set(now_ns);
         self.refused.note(page, &trace.part, verdict);
+        for alert in self.sink.alerts() {
+            let (a, b) = (alert.track, Danger::of(alert.collision_probability, alert.time_s).to_number());
+            page.say(Said { id: EventId::CollisionAlert, time_ns: now_ns, sweep: trace.part.sweep, a, b });
+        }
         if trace.part.is_last() {
             let sent_ns = trace.hops().last().map_or(now_ns, |hop| hop.finished_ns);
             let latency_ns = sent_ns.saturating_sub(trace.due_ns);
