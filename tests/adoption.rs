@@ -13,7 +13,7 @@ use serde_json::Value;
 use support::{Finished, Run};
 use transport::Instance;
 
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 
 /// What the pages of an instance say, whether or not it has a supervisor.
 fn status(run: &Run) -> supervisor::Status {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Bottom to top: a crate of `shared/` may use only those before it.
 const LAYERS: [&str; 7] = ["lidar", "messages", "stage", "events", "chain", "transport", "runtime"];
 /// Rooms without IPC, clock, thread, file or log.
-const PURE: [&str; 5] = ["simulator", "clusterer", "extractor", "classifier", "faults"];
+const PURE: [&str; 6] = ["simulator", "clusterer", "extractor", "classifier", "tracker", "faults"];
 /// What a pure room must not depend on.
 const IMPURE: [&str; 16] = [
     "chain",

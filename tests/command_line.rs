@@ -155,7 +155,7 @@ fn a_trace_follows_every_sweep_through_every_stage() {
     let of = |phase: &str| events.iter().filter(move |event| event["ph"] == phase).collect::<Vec<_>>();
     let names: Vec<_> =
         of("M").iter().filter(|e| e["name"] == "process_name").map(|e| e["args"]["name"].clone()).collect();
-    assert_eq!(names, ["source", "clusterer", "extractor", "classifier", "recorder"]);
+    assert_eq!(names, ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"]);
     for sweep in 0..5 {
         let flow = |phase: &str| of(phase).iter().filter(|event| event["id"] == sweep).count();
         assert_eq!((flow("s"), flow("t"), flow("f")), (1, 2, 1), "sweep {sweep}");

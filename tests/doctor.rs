@@ -22,7 +22,7 @@ fn chain(dir: &Path, asks: bool) -> PathBuf {
             .replacen("lock_memory = false", "lock_memory = true", 1)
             .replacen("prefault = false", "prefault = true\nsupervisor = { priority = 50 }", 1)
             .replacen("sweeps = 100", &seat("sweeps = 100", "{ priority = 20 }"), 1);
-        for stage in ["clusterer", "extractor", "classifier"] {
+        for stage in ["clusterer", "extractor", "classifier", "tracker"] {
             let at = format!("parameters = \"stages/{stage}.toml\"");
             assert!(text.contains(&at));
             text = text.replacen(&at, &seat(&at, "{ priority = 40 }"), 1);
@@ -145,7 +145,7 @@ fn a_chain_that_asks_for_nothing_is_refused_nothing_and_reports_the_kernels_figu
         assert!(load[share].as_f64().unwrap() >= 0.0, "{load}");
     }
     assert!(done.report["noise_ms"]["count"].as_u64().unwrap() > 10);
-    for stage in ["source", "clusterer", "extractor", "classifier", "recorder", "supervisor"] {
+    for stage in ["source", "clusterer", "extractor", "classifier", "tracker", "recorder", "supervisor"] {
         let process = done.process(stage);
         assert!(process["voluntary_switches"].as_u64().unwrap() > 0, "{process}");
         assert!(process["run_delay_ms"].is_null() || process["run_delay_ms"].as_f64().unwrap() >= 0.0, "{process}");

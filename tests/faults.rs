@@ -9,7 +9,7 @@ use std::process::Child;
 use runtime::clock;
 use support::{Finished, Run};
 
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 
 #[test]
 fn a_killed_stage_is_back_and_the_ledger_names_what_was_lost() {

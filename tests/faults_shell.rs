@@ -12,7 +12,7 @@ use runtime::page::{Heard, PageMap};
 use serde_json::Value;
 use support::{Finished, Run, chain_with};
 
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 
 /// A chain that runs for as long as the test wants.
 struct Endless {

@@ -14,7 +14,7 @@ use serde_json::Value;
 use support::{Run, recorded};
 use transport::Instance;
 
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 const LIGHT: [&str; 4] = ["--duration", "forever", "--from", "config/scenes/single.toml"];
 const MS: u64 = 1_000_000;
 

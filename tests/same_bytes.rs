@@ -8,7 +8,7 @@ use std::process::Command;
 
 use support::{Finished, NO_LADDER, Run};
 
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 
 /// A chain that does everything at real time too, however late: no ladder, a queue of 4 s, old parts are still answered.
 fn patient_chain() -> (tempfile::TempDir, String) {
@@ -21,7 +21,7 @@ fn patient_chain() -> (tempfile::TempDir, String) {
 
 fn at_pace(source: &[&str], pace: &[&str]) -> Finished {
     let (_dir, chain) = patient_chain();
-    let run = Run::new(&[source, pace, &["--chain", &chain]].concat()).with_labels().finish().expect_code(0);
+    let run = Run::new(&[source, pace, &["--chain", &chain]].concat()).with_all_rows().finish().expect_code(0);
     assert_eq!(run.missing(), 0, "{}", run.stdout());
     run
 }
@@ -33,14 +33,14 @@ fn at_the_sensors_pace_at_another_rate_and_as_fast_as_it_goes_the_bytes_are_the_
     assert_eq!(fast.sweeps().len(), 20);
     for pace in [&[][..], &["--rate", "2.5"]] {
         let run = at_pace(&scene, pace);
-        assert!(run.bytes == fast.bytes && run.labels == fast.labels, "{pace:?}");
+        assert!(run.has_rows_of(&fast), "{pace:?}");
     }
     let Some(capture) = support::recorded("vlp16/veloview_vlp16.pcap") else { return };
     let capture = ["--from", capture.to_str().unwrap(), "--sensor", "vlp-16", "--sweeps", "20"];
     let fast = at_pace(&capture, &["--pace", "fast"]);
     for pace in [&[][..], &["--rate", "0.5"]] {
         let run = at_pace(&capture, pace);
-        assert!(run.bytes == fast.bytes && run.labels == fast.labels, "{pace:?}");
+        assert!(run.has_rows_of(&fast), "{pace:?}");
     }
 }
 
@@ -80,23 +80,23 @@ fn a_sweep_at_a_time_the_bytes_are_the_same_and_nothing_comes_unasked() {
 #[test]
 fn on_one_core_the_bytes_are_those_of_all_cores() {
     let args = ["--from", "config/scenes/default.toml", "--sweeps", "20", "--pace", "fast"];
-    let all = Run::new(&args).with_labels().finish().expect_code(0);
-    let run = Run::new(&args).with_labels();
+    let all = Run::new(&args).with_all_rows().finish().expect_code(0);
+    let run = Run::new(&args).with_all_rows();
     let child = run.start_with(|encke| {
         let mut command = Command::new("taskset");
         command.args(["-c", "0"]).arg(encke.get_program()).args(encke.get_args());
         command
     });
     let one = run.collect(child).expect_code(0);
-    assert!(one.bytes == all.bytes && one.labels == all.labels);
+    assert!(one.has_rows_of(&all));
 }
 
 #[test]
 fn a_run_in_which_stages_die_at_fast_pace_ends_like_one_without() {
     let args = ["--from", "config/scenes/box.toml", "--sweeps", "300", "--pace", "fast"];
-    let plain = Run::new(&args).with_labels().finish().expect_code(0);
+    let plain = Run::new(&args).with_all_rows().finish().expect_code(0);
     for stage in STAGES {
-        let run = Run::new(&args).with_labels();
+        let run = Run::new(&args).with_all_rows();
         let mut child = run.start();
         run.wait_for_sweeps(5);
         // Makes the run long enough to die in; it changes no byte.
@@ -114,6 +114,8 @@ fn a_run_in_which_stages_die_at_fast_pace_ends_like_one_without() {
         assert_eq!(run.process(stage)["restarts"], deaths);
         assert_eq!((run.missing(), run.report["sweeps"].as_u64()), (0, Some(300)), "{}", run.stdout());
         assert!(run.bytes == plain.bytes && run.labels == plain.labels, "{stage}");
+        // A tracker begins anew; its tracks were in its memory alone.
+        assert!(stage == "tracker" || run.tracks == plain.tracks, "{stage}");
         for hop in &STAGES[1..] {
             assert_eq!(support::sum(&run.hop(hop)["dropped"]), 0, "the window holds through deaths");
         }

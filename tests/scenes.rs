@@ -10,10 +10,10 @@ use support::{LADDER, NO_LADDER, Run, chain_with, encke, leftovers, sum, text};
 
 #[test]
 fn every_sweep_gets_a_line_and_the_ledger_closes() {
-    let run = Run::new(&["--sweeps", "60", "--pace", "fast"]).with_labels().finish().expect_code(0);
+    let run = Run::new(&["--sweeps", "60", "--pace", "fast"]).with_all_rows().finish().expect_code(0);
     assert!(run.is_closed());
     assert_eq!(run.sweeps(), (0..60).collect::<Vec<_>>());
-    for stage in ["clusterer", "extractor", "classifier", "recorder"] {
+    for stage in ["clusterer", "extractor", "classifier", "tracker", "recorder"] {
         let hop = run.hop(stage);
         for key in ["published", "received", "processed"] {
             assert_eq!(hop[key], 60 * run.report["sectors"].as_u64().unwrap(), "{stage} {key}");
@@ -35,11 +35,12 @@ fn the_same_scene_gives_the_same_bytes_at_any_pace() {
     // On a machine that is busy otherwise the ladder would leave things out.
     let (_dir, chain) = chain_with(&[(LADDER, NO_LADDER)]);
     let args = ["--from", "config/scenes/reference.toml", "--sweeps", "12", "--chain", &chain];
-    let fast = Run::new(&[&args[..], &["--pace", "fast"]].concat()).with_labels().finish().expect_code(0);
-    let again = Run::new(&[&args[..], &["--pace", "fast"]].concat()).with_labels().finish().expect_code(0);
-    let paced = Run::new(&args).with_labels().finish().expect_code(0);
+    let fast = Run::new(&[&args[..], &["--pace", "fast"]].concat()).with_all_rows().finish().expect_code(0);
+    let again = Run::new(&[&args[..], &["--pace", "fast"]].concat()).with_all_rows().finish().expect_code(0);
+    let paced = Run::new(&args).with_all_rows().finish().expect_code(0);
     assert_eq!(fast.bytes, again.bytes);
     assert_eq!(fast.labels, again.labels);
+    assert_eq!(fast.tracks, again.tracks);
     if paced.missing() == 0 {
         assert_eq!(fast.bytes, paced.bytes);
     } else {
@@ -85,7 +86,7 @@ fn ctrl_c_drains_the_chain_and_prints_the_summary() {
 #[test]
 fn process_allocates_nothing_and_the_shell_at_most_once_a_sweep() {
     let run = Run::new(&["--sweeps", "80", "--pace", "fast"]).finish().expect_code(0);
-    for stage in ["clusterer", "extractor", "classifier"] {
+    for stage in ["clusterer", "extractor", "classifier", "tracker"] {
         let process = run.process(stage);
         assert_eq!(process["heap_allocations_per_sweep"], 0.0, "{stage}");
         assert!(process["shell_heap_allocations_per_sweep"].as_f64().unwrap() <= 1.0, "{stage}: {process}");

@@ -11,9 +11,9 @@ fn assert_same_for_any_number_of_sectors(args: &[&str], sectors: &[u32]) {
     let run = |sectors: u32| {
         let sectors = sectors.to_string();
         let args = [args, &["--pace", "fast", "--sectors", &sectors]].concat();
-        let run = Run::new(&args).with_labels().finish().expect_code(0);
+        let run = Run::new(&args).with_all_rows().finish().expect_code(0);
         assert_eq!(run.missing(), 0);
-        (run.bytes, run.labels)
+        (run.bytes, run.labels, run.tracks)
     };
     let whole = run(1);
     assert!(!whole.0.is_empty() && !whole.1.is_empty());

@@ -11,7 +11,7 @@ use serde_json::Value;
 static SOAKS: AtomicU32 = AtomicU32::new(0);
 
 /// Stages of the shipped chain.
-const STAGES: [&str; 5] = ["source", "clusterer", "extractor", "classifier", "recorder"];
+const STAGES: [&str; 6] = ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"];
 
 /// A soak that has ended.
 struct Soaked {
@@ -73,7 +73,7 @@ fn a_chain_without_faults_holds_for_a_while() {
     assert_eq!((&overall["missing"], &overall["broken"]), (&0.into(), &0.into()), "{}", soaked.said);
     assert_eq!(soaked.bar("change of file descriptors")["passed"], true);
     let samples = std::fs::read_to_string(soaked.dir.path().join("out/samples.csv")).unwrap();
-    assert!(samples.lines().count() >= 15 && samples.lines().all(|line| line.split(',').count() == 48), "{samples}");
+    assert!(samples.lines().count() >= 15 && samples.lines().all(|line| line.split(',').count() == 54), "{samples}");
     let events = std::fs::read_to_string(soaked.dir.path().join("out/events.jsonl")).unwrap();
     assert!(events.contains("run_began"), "{events}");
     assert!(soaked.verdict["observer"]["looks"].as_u64().unwrap() > 1_000);

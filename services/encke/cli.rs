@@ -135,6 +135,9 @@ pub(crate) struct RunArgs {
     /// Write detections, one JSON line a sweep; - is standard output.
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) detections: Option<PathBuf>,
+    /// Write tracks, one JSON line a sweep; - is standard output.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) tracks: Option<PathBuf>,
     /// Write the cluster of every return: sweep,return,cluster; - is standard output.
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) labels: Option<PathBuf>,
@@ -229,7 +232,7 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
 /// Options of `encke stage`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct StageArgs {
-    /// The stage: source, clusterer, extractor, classifier, recorder.
+    /// The stage: source, clusterer, extractor, classifier, tracker, recorder.
     pub(crate) name: String,
     /// The instance that it belongs to.
     #[arg(long, value_name = "NAME")]

@@ -10,6 +10,7 @@ use runtime::{
 };
 use serde::de::DeserializeOwned;
 use stage::{InitError, Settled, Stage};
+use tracker::Tracker;
 use transport::Instance;
 
 use crate::assets::Assets;
@@ -47,6 +48,7 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
         Clusterer::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Clusterer>(&shell)),
         Extractor::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Extractor>(&shell)),
         Classifier::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Classifier>(&shell)),
+        Tracker::NAME if is_stand_in => enter(plan).and_then(|shell| run_stand_in::<Tracker>(&shell)),
         Clusterer::NAME => {
             let stage = clusterer(&plan)?;
             enter(plan).and_then(|shell| run_stage(stage, &shell, |plan| clusterer(plan).map_err(in_words)))
@@ -59,6 +61,10 @@ pub(crate) fn stage(args: &StageArgs) -> Result<(), Failure> {
             let stage = classifier(&plan, &assets)?;
             let rebuild = |plan: &Plan| classifier(plan, &assets).map_err(in_words);
             enter(plan).and_then(|shell| run_stage(stage, &shell, rebuild))
+        }
+        Tracker::NAME => {
+            let stage = tracker(&plan)?;
+            enter(plan).and_then(|shell| run_stage(stage, &shell, |plan| tracker(plan).map_err(in_words)))
         }
         RECORDER => {
             if is_stand_in {
@@ -115,6 +121,7 @@ pub(crate) fn check_stages(plan: &Plan, assets: &Assets) -> Result<(), Failure> 
             Clusterer::NAME => drop(clusterer(plan)?),
             Extractor::NAME => drop(extractor(plan)?),
             Classifier::NAME => drop(classifier(plan, assets)?),
+            Tracker::NAME => drop(tracker(plan)?),
             RECORDER => {}
             name => return Err(unknown(name)),
         }
@@ -130,7 +137,7 @@ fn in_words(failure: Failure) -> String {
 }
 
 fn unknown(name: &str) -> Failure {
-    let known = [SOURCE, Clusterer::NAME, Extractor::NAME, Classifier::NAME, RECORDER, TAPE].join(", ");
+    let known = [SOURCE, Clusterer::NAME, Extractor::NAME, Classifier::NAME, Tracker::NAME, RECORDER, TAPE].join(", ");
     Failure::start(format!("no stage {name:?}; there are {known}"))
 }
 
@@ -139,6 +146,10 @@ fn clusterer(plan: &Plan) -> Result<Clusterer, Failure> {
 }
 
 fn extractor(plan: &Plan) -> Result<Extractor, Failure> {
+    init(plan, |_| Ok(()))
+}
+
+fn tracker(plan: &Plan) -> Result<Tracker, Failure> {
     init(plan, |_| Ok(()))
 }
 
@@ -241,6 +252,7 @@ fn recorder(shell: &Shell, settled: Settled) -> Result<Recorder, ShellError> {
     let plan = shell.plan();
     let settings = Settings {
         detections: plan.outputs.detections.clone(),
+        tracks: plan.outputs.tracks.clone(),
         labels: plan.outputs.labels.clone(),
         trace: plan.outputs.trace.clone(),
         statistics: Some(Plan::snapshot_path(shell.instance(), shell.incarnation())),

@@ -28,6 +28,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let iceoryx2_config = assets.text("iceoryx2.toml").map_err(Failure::start)?;
     let files = [
         ("--detections", plan.outputs.detections.as_deref()),
+        ("--tracks", plan.outputs.tracks.as_deref()),
         ("--labels", plan.outputs.labels.as_deref()),
         ("--trace", plan.outputs.trace.as_deref()),
         ("--record", plan.outputs.record.as_deref()),
@@ -98,6 +99,7 @@ pub(crate) fn plan(args: &RunArgs, assets: &Assets) -> Result<Plan, Failure> {
         duration_ns,
         outputs: Outputs {
             detections: absolute(&args.detections)?,
+            tracks: absolute(&args.tracks)?,
             labels: absolute(&args.labels)?,
             trace: absolute(&args.trace)?,
             record: absolute(&args.record)?,

@@ -27,6 +27,7 @@ pub struct Finished {
     /// The same, as bytes.
     pub bytes: Vec<u8>,
     pub labels: String,
+    pub tracks: String,
 }
 
 impl Run {
@@ -43,9 +44,9 @@ impl Run {
         Self { dir, instance, args }
     }
 
-    /// Also writes labels.
-    pub fn with_labels(self) -> Self {
-        self.with_file("--labels", "l.csv")
+    /// Also writes labels and tracks.
+    pub fn with_all_rows(self) -> Self {
+        self.with_file("--labels", "l.csv").with_file("--tracks", "t.jsonl")
     }
 
     /// Also writes another file into the run's folder.
@@ -97,10 +98,10 @@ impl Run {
         let lines = std::str::from_utf8(&bytes).unwrap().lines();
         let detections = lines.map(|line| serde_json::from_str(line).unwrap()).collect();
         let report = serde_json::from_slice(&read("r.json")).unwrap_or(Value::Null);
-        let labels = String::from_utf8(read("l.csv")).unwrap();
+        let [labels, tracks] = ["l.csv", "t.jsonl"].map(|file| String::from_utf8(read(file)).unwrap());
         let left = leftovers(&self.instance);
         assert!(left.is_empty(), "left in shared memory or on disk: {left:?}");
-        (Finished { output, report, detections, bytes, labels }, self.dir)
+        (Finished { output, report, detections, bytes, labels, tracks }, self.dir)
     }
 
     /// Waits until the source has sent so many sweeps.
@@ -192,6 +193,11 @@ impl Run {
 }
 
 impl Finished {
+    /// Whether all rows of all sweeps are the same to the byte.
+    pub fn has_rows_of(&self, other: &Self) -> bool {
+        self.bytes == other.bytes && self.labels == other.labels && self.tracks == other.tracks
+    }
+
     /// Asserts its exit code, showing what it said otherwise.
     pub fn expect_code(self, code: i32) -> Self {
         assert_eq!(self.output.status.code(), Some(code), "{}{}", self.stdout(), self.stderr());

@@ -2,7 +2,7 @@
 
 pub(super) const RUN_EXAMPLES: &str = "Examples:
   encke run                                        the default scene, 100 sweeps
-  encke run --from capture.pcap --detections d.jsonl --labels l.csv
+  encke run --from capture.pcap --detections d.jsonl --tracks t.jsonl --labels l.csv
   encke run --from config/scenes/ring-crossing.toml --duration 60s --report report.json
   encke run --from 'sweeps/*.csv' --pace fast      as fast as it goes, nothing dropped
   encke run --from udp://127.0.0.1:2368            a live sensor, until stopped

@@ -20,6 +20,7 @@
 //! ```
 
 mod cast;
+mod ego;
 mod field;
 mod mesh;
 mod obstacle;
@@ -30,8 +31,9 @@ mod solids;
 mod turn;
 mod window;
 
+pub use ego::Ego;
 pub use field::{Field, FieldFile};
 pub use mesh::{Mesh, MeshError};
 pub use obstacle::{Body, Motion, Obstacle, Pose, Shape};
-pub use scene::{MeshFile, ObstacleFile, Scene, SceneError, SceneFile};
+pub use scene::{EgoFile, MeshFile, ObstacleFile, Scene, SceneError, SceneFile};
 pub use simulator::Simulator;

@@ -3,7 +3,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use stage::{Next, Source, SourceError};
 
-use crate::cast::{self, Hit};
+use crate::cast::{self, Hit, View};
+use crate::ego::Ego;
 use crate::obstacle::{Obstacle, Pose};
 use crate::scene::{Scene, SceneError};
 use crate::turn::Turn;
@@ -77,6 +78,7 @@ impl Simulator {
             column_step_rad: self.turn.step_rad() as f32,
             range_sigma_m: self.scene.receiver().range_sigma_m as f32,
             reach_m: self.scene.receiver().reach_m[1] as f32,
+            ego: self.scene.ego().map(|ego| ego.motion(sensor_time_ns as f64 * 1e-9)).unwrap_or_default(),
             ..SweepHeader::default()
         };
     }
@@ -84,13 +86,15 @@ impl Simulator {
     /// Fills `hits` with the nearest surface of each firing, and the truth with the obstacles.
     fn cast_all(&mut self, sensor_time_ns: u64, truth: &mut Truth) {
         let start_s = sensor_time_ns as f64 * 1e-9;
+        let ego = self.scene.ego().copied().unwrap_or_default();
+        let view = View { turn: &self.turn, ego: &ego, start_s };
         self.hits.fill(Hit::MISS);
         for (place, obstacle) in self.scene.obstacles().iter().enumerate() {
             let id = place as u16;
             let start = obstacle.motion.pose(start_s, self.scene.horizon_m());
-            let window = cast::window(&self.turn, obstacle, &start);
-            cast::cast(&self.turn, obstacle, &start, &window, id, &mut self.hits);
-            let fits = truth.objects.push(truth_of(obstacle, &start, id)).is_ok();
+            let window = cast::window(view, obstacle, &start);
+            cast::cast(view, obstacle, &start, &window, id, &mut self.hits);
+            let fits = truth.objects.push(truth_of(obstacle, &start, &ego, start_s, id)).is_ok();
             debug_assert!(fits, "a checked scene fits its truth");
         }
     }
@@ -138,14 +142,21 @@ impl Source for Simulator {
     }
 }
 
-fn truth_of(obstacle: &Obstacle, start: &Pose, id: u16) -> TruthObject {
-    let attitude = start.attitude.cast::<f32>();
+fn truth_of(obstacle: &Obstacle, start: &Pose, ego: &Ego, start_s: f64, id: u16) -> TruthObject {
+    let (velocity_mps, spin_radps) = (obstacle.motion.velocity_mps, obstacle.motion.spin_radps);
+    let (seen, velocity_mps, spin_radps) = if ego.turns() {
+        let turn = ego.to_sensor(start_s);
+        (ego.seen(start, start_s), turn * velocity_mps, turn * spin_radps)
+    } else {
+        (start.clone(), velocity_mps, spin_radps)
+    };
+    let attitude = seen.attitude.cast::<f32>();
     TruthObject {
-        centre_m: start.position_m.cast::<f32>().into(),
+        centre_m: seen.position_m.cast::<f32>().into(),
         attitude_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
         size_m: obstacle.body.size_m().cast::<f32>().into(),
-        velocity_mps: obstacle.motion.velocity_mps.cast::<f32>().into(),
-        spin_radps: obstacle.motion.spin_radps.cast::<f32>().into(),
+        velocity_mps: velocity_mps.cast::<f32>().into(),
+        spin_radps: spin_radps.cast::<f32>().into(),
         returns: 0,
         id,
         kind: obstacle.body.kind(),

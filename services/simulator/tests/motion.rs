@@ -54,6 +54,46 @@ fn each_return_lies_on_its_obstacle_at_its_own_firing_time() {
     }
 }
 
+// verifies SIM-019
+#[test]
+fn each_return_lies_on_its_obstacle_when_the_sensor_itself_drifts_and_turns_as_the_header_says() {
+    let ego = "[ego]\nvelocity_mps = [2.0, 1.0, -0.5]\nspin_dps = [4.0, -9.0, 25.0]\n";
+    let [position, velocity, spin] = [[9.0, -4.0, 0.5], [-1.0, 13.0, 0.5], [90.0, -120.0, 60.0]];
+    let text = exact("hdl-32e") + ego + &obstacle("box", [3.0, 3.0, 5.0], position, velocity, spin);
+    let still = exact("hdl-32e") + &obstacle("box", [3.0, 3.0, 5.0], position, velocity, spin);
+    let inertial = simulator(&still).scene().obstacles()[0].motion.clone();
+    let mut simulator = simulator(&text);
+    let (mut worst, mut returns) = (0.0_f64, 0);
+    for number in [0, 2, 5] {
+        let (sweep, truth) = sweep_of(&mut simulator, number);
+        let known = sweep.header.ego.get().unwrap();
+        let [w, x, y, z] = known.attitude_wxyz;
+        let to_inertial = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let [place, speed, turn] = [known.position_m, known.velocity_mps, known.spin_radps].map(Vector3::from);
+        for r in &sweep.returns {
+            let column = sweep.columns[usize::from(r.column)];
+            let ring = sweep.rings[usize::from(r.ring)];
+            let after_s = f64::from(column.offset_ns + ring.offset_ns) * 1e-9;
+            let axes = UnitQuaternion::from_scaled_axis(turn * after_s) * to_inertial;
+            let point = place + speed * after_s + axes * Vector3::new(r.x, r.y, r.z).cast::<f64>();
+            let pose = inertial.pose(sweep.header.sensor_time_ns as f64 * 1e-9 + after_s, 1e6);
+            let body = pose.attitude.inverse() * (point - pose.position_m);
+            worst = worst.max(off_surface("box", body, Vector3::new(1.5, 1.5, 2.5)).abs());
+            returns += 1;
+        }
+        // What the truth says is relative to the sensor, along its axes.
+        let truth = truth.objects[0];
+        let pose = inertial.pose(sweep.header.sensor_time_ns as f64 * 1e-9, 1e6);
+        let centre = to_inertial.inverse() * (pose.position_m - place);
+        assert!((Vector3::from(truth.centre_m).cast::<f64>() - centre).norm() < 1e-5);
+        let relative = to_inertial.inverse() * (inertial.velocity_mps - speed);
+        assert!((Vector3::from(truth.velocity_mps).cast::<f64>() - relative).norm() < 1e-5);
+    }
+    assert!(returns > 500, "{returns}");
+    // Positions are rounded to single precision, and tens of metres away by now.
+    assert!(worst < 2e-5, "{worst}");
+}
+
 // verifies SIM-010
 #[test]
 fn a_wrong_time_or_attitude_would_show() {

@@ -15,7 +15,7 @@ use super::RunFigures;
 
 /// The stages by position, as the chain is shipped; a recording does not name them.
 const STAGES: [&str; 8] =
-    ["source", "clusterer", "extractor", "classifier", "stage 4", "stage 5", "stage 6", "stage 7"];
+    ["source", "clusterer", "extractor", "classifier", "tracker", "stage 5", "stage 6", "stage 7"];
 /// What no sweep takes, where the deadline is not known [ms].
 const NEVER_MS: f64 = 3_600_000.0;
 

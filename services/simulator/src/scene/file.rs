@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::check::{Bounds, Table};
 use super::{Scene, SceneError};
+use crate::ego::Ego;
 use crate::field::FieldFile;
 use crate::mesh::Mesh;
 use crate::obstacle::{Body, Motion, Obstacle, Shape};
@@ -15,6 +16,8 @@ use crate::obstacle::{Body, Motion, Obstacle, Shape};
 pub(crate) const SPIN_DPS: f64 = 360.0;
 /// Speed that a scene may ask for, along each axis [m/s].
 pub(crate) const SPEED_MPS: f64 = 1_000.0;
+/// Spin of the sensor that a scene may ask for, about each axis [deg/s]: what a tumbling craft may have.
+const EGO_SPIN_DPS: f64 = 60.0;
 /// Farthest that anything may be [m].
 pub(crate) const FAR_M: f64 = 10_000.0;
 
@@ -39,6 +42,8 @@ pub struct SceneFile {
     pub seed: u64,
     /// An obstacle that leaves the ball of this radius round the sensor [m] comes in again on its other side.
     pub horizon_m: f64,
+    /// How the sensor itself moves; at rest, and the sweeps say nothing of it, where it is left out.
+    pub ego: Option<EgoFile>,
     /// Solids, one by one.
     #[serde(default)]
     pub obstacle: Vec<ObstacleFile>,
@@ -48,6 +53,16 @@ pub struct SceneFile {
     /// Meshes, one by one.
     #[serde(default)]
     pub mesh: Vec<MeshFile>,
+}
+
+/// The sensor's own motion, as written; inertial frame, which is the sensor's own at time 0.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EgoFile {
+    /// Velocity [m/s].
+    pub velocity_mps: [f64; 3],
+    /// Angular velocity [deg/s].
+    pub spin_dps: [f64; 3],
 }
 
 /// One solid of a scene, as written.
@@ -118,8 +133,24 @@ impl SceneFile {
             field.place(table, scene.field_rng(index), &mut obstacles)?;
             scene.fields.push(field);
         }
+        scene.ego = self.ego.map(EgoFile::checked).transpose()?;
+        if let Some(ego) = &scene.ego {
+            // A scene's obstacles move relative to the sensor's place.
+            obstacles.iter_mut().for_each(|obstacle| obstacle.motion.velocity_mps -= ego.velocity_mps);
+        }
         scene.replace_obstacles(obstacles)?;
         Ok(scene)
+    }
+}
+
+impl EgoFile {
+    fn checked(self) -> Result<Ego, SceneError> {
+        let table = Table::SCENE;
+        let spin_dps = table.vector("ego.spin_dps", self.spin_dps, Bounds::Closed(-EGO_SPIN_DPS, EGO_SPIN_DPS))?;
+        Ok(Ego {
+            velocity_mps: table.vector("ego.velocity_mps", self.velocity_mps, Bounds::Closed(-SPEED_MPS, SPEED_MPS))?,
+            spin_radps: spin_dps.map(f64::to_radians),
+        })
     }
 }
 

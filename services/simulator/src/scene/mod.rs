@@ -11,9 +11,10 @@ use rand_chacha::ChaCha8Rng;
 
 pub(crate) use check::{Bounds, Table};
 pub use error::SceneError;
+pub use file::{EgoFile, MeshFile, ObstacleFile, SceneFile};
 pub(crate) use file::{FAR_M, SPEED_MPS, SPIN_DPS};
-pub use file::{MeshFile, ObstacleFile, SceneFile};
 
+use crate::ego::Ego;
 use crate::field::Field;
 use crate::obstacle::Obstacle;
 use crate::receiver::{MOST_COUNTS, Receiver};
@@ -29,6 +30,7 @@ pub struct Scene {
     receiver: Receiver,
     seed: u64,
     horizon_m: f64,
+    ego: Option<Ego>,
     fields: Vec<Field>,
     obstacles: Vec<Obstacle>,
 }
@@ -64,6 +66,7 @@ impl Scene {
             receiver,
             seed: file.seed,
             horizon_m: scene.within("horizon_m", file.horizon_m, Bounds::Above(0.0, FAR_M))?,
+            ego: None,
             fields: Vec::new(),
             obstacles: Vec::new(),
         })
@@ -113,6 +116,11 @@ impl Scene {
     /// The distributions that the scene's fields were drawn from.
     pub fn fields(&self) -> &[Field] {
         &self.fields
+    }
+
+    /// How the sensor itself moves, where the scene says so.
+    pub fn ego(&self) -> Option<&Ego> {
+        self.ego.as_ref()
     }
 
     /// Radius of the ball that obstacles leave and enter [m].

@@ -5,7 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::UnitSphere;
 
 use super::*;
-use crate::cast::{self, Hit};
+use crate::cast::{self, Hit, View};
+use crate::ego::Ego;
 use crate::obstacle::{Body, Motion, Obstacle, Shape};
 
 fn turn(columns: usize, quantised: bool) -> Turn {
@@ -42,19 +43,22 @@ fn random_obstacle(rng: &mut ChaCha8Rng) -> Obstacle {
 #[test]
 fn rays_outside_the_window_meet_nothing_and_those_inside_meet_the_same_bit_for_bit() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let still = Ego::default();
+    let turning = Ego { spin_radps: Vector3::new(0.3, -0.2, 0.5), ..still };
     let (mut hits, mut smaller) = (0, 0);
     for round in 0..400 {
         let mut turn = turn([360, 500, 1_084][round % 3], round % 2 == 0);
         turn.begin(round as u64);
         let obstacle = random_obstacle(&mut rng);
         let start = obstacle.motion.pose(0.0, 1_000.0);
+        let view = View { turn: &turn, ego: if round % 4 == 3 { &turning } else { &still }, start_s: 0.0 };
         let rays = turn.columns().len() * turn.rings().len();
         let cast_in = |window: &Window| {
             let mut hits = vec![Hit::MISS; rays];
-            cast::cast(&turn, &obstacle, &start, window, 0, &mut hits);
+            cast::cast(view, &obstacle, &start, window, 0, &mut hits);
             hits
         };
-        let window = cast::window(&turn, &obstacle, &start);
+        let window = cast::window(view, &obstacle, &start);
         let (found, expected) = (cast_in(&window), cast_in(&Window::whole(&turn)));
         assert!(found == expected, "round {round}: {obstacle:?} {window:?}");
         hits += found.iter().filter(|hit| hit.range_m.is_finite()).count();
