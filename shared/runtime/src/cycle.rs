@@ -42,7 +42,7 @@ impl<'a, S: Stage, B> Cycle<'a, S, B> {
         let deadline = Deadline::of(&shell.plan, &shell.name);
         let taken_by_others = Laps::of_this_thread();
         let (arrivals, refused) = (Arrivals::new(shell), Refused::default());
-        let tables = Tables::new(&shell.page, stage, shell.plan.kept_sweeps() as u64);
+        let tables = Tables::new(&shell.page, stage, S::take_over, shell.plan.kept_sweeps() as u64);
         Self { tables, rebuild, shell, outlet, arrivals, deadline, refused, taken_by_others }
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Tables<'a, S> {
     from_sweep: u64,
     /// Generation that was built, or refused, last.
     tried: u64,
+    /// Lets the next stage go on where the one before it stood.
+    take_over: fn(&mut S, &S),
     /// Sweeps after which none before `from_sweep` is sent again.
     kept_sweeps: u64,
     /// The sweep of the last part; none before the first.
@@ -32,7 +34,7 @@ pub(crate) struct Tables<'a, S> {
 
 impl<'a, S> Tables<'a, S> {
     /// Begins with a stage built from the parameters that the page names as active; `kept_sweeps` may be sent again.
-    pub(crate) fn new(page: &'a Page, stage: S, kept_sweeps: u64) -> Self {
+    pub(crate) fn new(page: &'a Page, stage: S, take_over: fn(&mut S, &S), kept_sweeps: u64) -> Self {
         let generation = page.table_active.get();
         Self {
             page,
@@ -43,6 +45,7 @@ impl<'a, S> Tables<'a, S> {
             generation,
             from_sweep: 0,
             tried: generation,
+            take_over,
             kept_sweeps,
             sweep: None,
             between: true,
@@ -97,6 +100,9 @@ impl<'a, S> Tables<'a, S> {
         if is_next_due != self.is_next_in_use {
             std::mem::swap(&mut self.stage, other);
             self.is_next_in_use = is_next_due;
+            if is_next_due {
+                (self.take_over)(&mut self.stage, other);
+            }
         }
         if is_next_due && !self.said {
             self.said = true;
@@ -160,7 +166,7 @@ mod tests {
     fn the_next_stage_takes_over_at_its_sweep_wherever_the_change_was_heard_of() {
         for heard_at in 0..=5 {
             let (_dir, page) = page();
-            let mut sut = Tables::new(&page, 0, 2);
+            let mut sut = Tables::new(&page, 0, |_, _| (), 2);
             let mut used = run(&mut sut, 0..heard_at, 1);
             want(&page, 1, 5);
             used.extend(run(&mut sut, heard_at..8, 1));
@@ -173,7 +179,7 @@ mod tests {
     #[test]
     fn a_change_that_is_heard_of_too_late_counts_from_the_next_sweep_on() {
         let (_dir, page) = page();
-        let mut sut = Tables::new(&page, 0, 2);
+        let mut sut = Tables::new(&page, 0, |_, _| (), 2);
         sut.at(7, || Ok(1));
         want(&page, 1, 5);
         sut.build_if_wanted(|| panic!("in the middle of a sweep"));
@@ -186,7 +192,7 @@ mod tests {
     #[test]
     fn the_next_stage_is_built_once_while_there_is_time_for_it() {
         let (_dir, page) = page();
-        let mut sut = Tables::new(&page, 0, 2);
+        let mut sut = Tables::new(&page, 0, |_, _| (), 2);
         want(&page, 1, 5);
         sut.build_if_wanted(|| Ok(1));
         sut.build_if_wanted(|| panic!("twice"));
@@ -197,7 +203,7 @@ mod tests {
     #[test]
     fn sweeps_that_are_sent_again_have_the_stage_that_they_had() {
         let (_dir, page) = page();
-        let mut sut = Tables::new(&page, 0, 3);
+        let mut sut = Tables::new(&page, 0, |_, _| (), 3);
         want(&page, 1, 5);
         assert_eq!(run(&mut sut, [3, 4, 5, 6, 3, 4, 5, 6, 7], 1), [0, 0, 1, 1, 0, 0, 1, 1, 1]);
         assert!(sut.other.is_some());
@@ -207,9 +213,25 @@ mod tests {
     }
 
     #[test]
+    fn the_next_stage_goes_on_where_the_one_before_it_stood_also_when_sweeps_are_sent_again() {
+        let (_dir, page) = page();
+        // A stage that remembers the sum of what it has seen, and its parameter.
+        let mut sut = Tables::new(&page, (0, 1), |next: &mut (u64, u64), before| next.0 = before.0, 3);
+        want(&page, 1, 5);
+        let mut sums = Vec::new();
+        for sweep in [3, 4, 5, 6] {
+            let stage = sut.at(sweep, || Ok((0, 100)));
+            stage.0 += stage.1;
+            sums.push(stage.0);
+            sut.sweep_ended();
+        }
+        assert_eq!(sums, [1, 2, 102, 202]);
+    }
+
+    #[test]
     fn what_is_refused_leaves_the_stage_as_it_is_and_the_next_change_is_tried() {
         let (_dir, page) = page();
-        let mut sut = Tables::new(&page, 0, 1);
+        let mut sut = Tables::new(&page, 0, |_, _| (), 1);
         want(&page, 1, 2);
         sut.build_if_wanted(|| Err("no".to_owned()));
         assert_eq!(run(&mut sut, 0..5, 9), [0; 5]);

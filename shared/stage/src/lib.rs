@@ -27,6 +27,10 @@ pub trait Stage: Sized {
     /// Fills `output`, which arrives empty. Never allocates, panics or fails: a bad part is a [`Verdict`].
     fn process(&mut self, part: Part, input: &Self::Input, output: &mut Self::Output) -> Verdict;
 
+    /// Goes on where `before` stood between two sweeps: it is replaced by this stage, which has other parameters. For
+    /// rooms that remember sweeps.
+    fn take_over(&mut self, _before: &Self) {}
+
     /// Fills `output`, which arrives empty, where the room itself cannot be kept running: with what passes it unchanged.
     fn pass_by(_input: &Self::Input, _output: &mut Self::Output) {}
 }
