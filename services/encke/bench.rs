@@ -8,6 +8,7 @@ mod measure;
 mod sectors;
 mod stages;
 mod surface;
+mod tracking;
 
 use std::path::Path;
 

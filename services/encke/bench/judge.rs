@@ -90,6 +90,14 @@ impl Judge {
         }
     }
 
+    /// What it said last; none where only decisions are timed.
+    pub(super) fn detections(&self) -> Option<&Detections> {
+        match &self.by {
+            By::Stage { detections, .. } => Some(detections),
+            By::File { .. } => None,
+        }
+    }
+
     pub(super) fn write(&self, hash: &mut dyn Hasher) {
         match &self.by {
             By::Stage { detections, .. } => {

@@ -13,6 +13,7 @@ use super::judge::Judge;
 use super::measure::Once;
 use super::sectors::Sectors;
 use super::surface::Surface;
+use super::tracking::Tracking;
 use crate::assets::Assets;
 use crate::cli::BenchArgs;
 use crate::{Failure, dispatch};
@@ -51,6 +52,7 @@ pub(super) const STAGES: &[Timed] = &[
         work: Workbench::full_chain,
         output: Workbench::write_judgements,
     },
+    Timed { name: "track", prepare: Workbench::meet, work: Workbench::track, output: Workbench::write_tracks },
     Timed {
         name: "paper_last_sector",
         prepare: Workbench::approach,
@@ -100,6 +102,7 @@ pub(super) struct Workbench {
     /// The chain's own.
     extraction: Extraction,
     judge: Judge,
+    tracking: Tracking,
     sectors: Sectors,
 }
 
@@ -119,6 +122,7 @@ impl Workbench {
             solids: Extraction::new(&making(plan, false, true)?)?,
             extraction: Extraction::new(plan)?,
             judge: Judge::configured(plan, assets)?,
+            tracking: Tracking::new(plan)?,
             sectors: Sectors::new(args, plan)?,
         })
     }
@@ -126,6 +130,7 @@ impl Workbench {
     /// Takes a sweep and runs the paper's stages on it once, so that each finds its input from then on.
     pub(super) fn load(&mut self, sweep: Box<Sweep>) -> Result<(), Failure> {
         self.sectors.load(&sweep);
+        self.tracking.unload();
         self.sweep = sweep;
         self.paper_chain().map_err(Failure::run)?;
         self.surface.load(&self.clustering.clusters);
@@ -211,6 +216,19 @@ impl Workbench {
         self.judge.process(&self.extraction.descriptors)
     }
 
+    /// Lets the tracker meet the obstacles, the first time.
+    fn meet(&mut self) -> Result<(), Rejected> {
+        if self.tracking.is_warm() {
+            return Ok(());
+        }
+        self.full_chain()?;
+        self.judge.detections().map_or(Ok(()), |detections| self.tracking.warm_up(detections))
+    }
+
+    fn track(&mut self) -> Result<(), Rejected> {
+        self.tracking.process_again()
+    }
+
     fn approach(&mut self) -> Result<(), Rejected> {
         self.sectors.approach()
     }
@@ -225,6 +243,10 @@ impl Workbench {
         self.sectors.process()?;
         self.extraction.process(&self.sectors.clusters)?;
         self.judge.process(&self.extraction.descriptors)
+    }
+
+    fn write_tracks(&self, hash: &mut dyn Hasher) {
+        self.tracking.write(hash);
     }
 
     fn write_last_sector(&self, hash: &mut dyn Hasher) {

@@ -38,6 +38,7 @@ pub(super) const BENCH_NOTES: &str = "Stages, each on what those before it left:
   paper_chain  cluster, the extractor's whole `process` with histograms (normals, histogram,
                choice of columns) and no solids, svm
   full_chain   cluster, extractor and classifier as their files have them
+  track        the tracker's `process` on what the full chain found, twenty sweeps after it met that first
   paper_last_sector, full_last_sector
                what both chains have still to do when the last of the chain's sectors has come
 
