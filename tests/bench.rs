@@ -11,7 +11,7 @@ use std::process::Stdio;
 use serde_json::Value;
 use support::{encke, text};
 
-const STAGES: [&str; 9] = [
+const STAGES: [&str; 10] = [
     "cluster",
     "normals",
     "histogram",
@@ -19,6 +19,7 @@ const STAGES: [&str; 9] = [
     "fit",
     "paper_chain",
     "full_chain",
+    "track",
     "paper_last_sector",
     "full_last_sector",
 ];
@@ -133,7 +134,8 @@ fn the_full_chain_is_the_configured_one_and_all_other_lines_are_the_same_whateve
         let lines = bench(&["--from", &path.display().to_string(), "--chain", &chain.display().to_string()]);
         assert_stages(&lines);
         for line in &lines {
-            let full = line["stage"].as_str().unwrap().starts_with("full_");
+            let stage = line["stage"].as_str().unwrap();
+            let full = stage.starts_with("full_") || stage == "track";
             assert_eq!(line["model"], if full { model } else { "paper-svm" }, "{line}");
             assert_eq!(line["support_vectors"] == 0, full && method != "svm", "{line}");
             assert!(line["stage"] != "fit" || line["fits"] == 2, "{line}");

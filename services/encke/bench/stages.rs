@@ -52,7 +52,7 @@ pub(super) const STAGES: &[Timed] = &[
         work: Workbench::full_chain,
         output: Workbench::write_judgements,
     },
-    Timed { name: "track", prepare: Workbench::meet, work: Workbench::track, output: Workbench::write_tracks },
+    Timed { name: TRACK, prepare: Workbench::meet, work: Workbench::track, output: Workbench::write_tracks },
     Timed {
         name: "paper_last_sector",
         prepare: Workbench::approach,
@@ -69,6 +69,7 @@ pub(super) const STAGES: &[Timed] = &[
 
 const FIT: &str = "fit";
 pub(super) const FULL_CHAIN: &str = "full_chain";
+const TRACK: &str = "track";
 const FULL_LAST_SECTOR: &str = "full_last_sector";
 
 /// Every sweep is whole.
@@ -168,9 +169,9 @@ impl Workbench {
         self.surface.described()
     }
 
-    /// The model that goes with a stage: the chain's own in the full chain, else the support vector machine.
+    /// The model that goes with a stage: the chain's own where the full chain's work is looked at, else the support vector machine.
     pub(super) fn judge_of(&self, stage: &Timed) -> &Judge {
-        if [FULL_CHAIN, FULL_LAST_SECTOR].contains(&stage.name) { &self.judge } else { &self.svm }
+        if [FULL_CHAIN, TRACK, FULL_LAST_SECTOR].contains(&stage.name) { &self.judge } else { &self.svm }
     }
 
     /// Clusters with fitted solids and mean evaluations for one, where that is the stage's work.
