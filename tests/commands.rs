@@ -247,7 +247,12 @@ fn tables_are_read_again_and_those_that_do_not_hold_change_nothing() {
     refused("hung_sweeps");
     std::fs::write(dir.path().join("executive.toml"), executive.replace("hung_sweeps = 1.5", "hung_sweeps = 2.5"))
         .unwrap();
-    assert!(run.ctl(&["reload"]).starts_with("parameters 1 from sweep"));
+    let said = run.ctl(&["reload"]);
+    assert!(said.starts_with("parameters 1 from sweep") && said.contains("in use by clusterer"), "{said}");
+    let named = |id: &str| run.events().iter().filter(|event| event["name"] == id).count();
+    // The pages say it a moment before the log does.
+    run.wait_for(|_| named("table_active") == said.split("in use by ").last().unwrap().split(", ").count());
+    assert_eq!(named("table_refused"), 0, "what does not hold does not come to the chain");
     let plan = plan();
     assert_eq!((&plan["generation"], &plan["executive"]["health"]["hung_sweeps"]), (&1.into(), &2.5.into()));
     assert!(plan["parameters"]["clusterer"].as_str().unwrap().contains("1.25"));
@@ -256,6 +261,14 @@ fn tables_are_read_again_and_those_that_do_not_hold_change_nothing() {
     run.ctl(&["restart", "clusterer"]);
     run.wait_for(|status| status["stages"][1]["restarts"] == 1 && status["stages"][1]["state"] == "running");
     run.wait_for_more(3);
+    // Nobody waits for a chain that stands still.
+    let active = named("table_active");
+    run.ctl(&["pause"]);
+    run.wait_for_mode("paused");
+    let said = run.ctl(&["reload"]);
+    assert!(said.starts_with("parameters 2 from sweep") && said.contains(": once the chain goes on"), "{said}");
+    run.ctl(&["resume"]);
+    run.wait_for(|_| named("table_active") == 2 * active);
     stop(run, child);
 }
 

@@ -47,14 +47,17 @@ pub(crate) fn ctl(args: &CtlArgs) -> Result<(), Failure> {
         Request::RestartChain => Command::of(Word::RestartChain),
         Request::Reload => Command { tables: Some(tables(&instance)?), ..Command::of(Word::Reload) },
     };
-    let answer = supervisor::command(&instance, &command).map_err(Failure::start)?;
+    let (mut answer, mut failed) = (supervisor::command(&instance, &command).map_err(Failure::start)?, "refused");
+    if answer.accepted && args.request == Request::Reload {
+        (answer, failed) = (supervisor::await_tables(&instance, &answer), "not in use everywhere");
+    }
     if args.json {
         crate::print(&(serde_json::to_string(&answer).map_err(Failure::run)? + "\n"))?;
     }
     match (answer.accepted, args.json) {
         (true, true) => Ok(()),
         (true, false) => crate::print(&(answer.text + "\n")),
-        (false, _) => Err(Failure::run(format!("refused: {}", answer.text))),
+        (false, _) => Err(Failure::run(format!("{failed}: {}", answer.text))),
     }
 }
 

@@ -63,7 +63,8 @@ pub(crate) enum Request {
     Restart,
     /// The same with all stages.
     RestartChain,
-    /// Read stage parameters and executive.toml again; they are checked first, and used from one sweep on.
+    /// Read stage parameters and executive.toml again; they are checked first, and used from one sweep on. Waits until each
+    /// stage uses them.
     Reload,
     /// Stop in order, drain, report.
     Stop,

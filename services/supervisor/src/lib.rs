@@ -42,7 +42,7 @@ mod timeline_report;
 mod watch;
 
 pub use beside::RecordingReport;
-pub use control::{Answer, Command, CommandsReport, ControlError, MAX_LINE_BYTES, Tables, Word, command};
+pub use control::{Answer, Command, CommandsReport, ControlError, MAX_LINE_BYTES, Tables, Word, await_tables, command};
 pub use error::SupervisorError;
 pub use events_report::EventsReport;
 pub use house::{Running, find_adoptable, running_instances};

@@ -1,6 +1,7 @@
 //! Commands to a running chain: one JSON object a line through a socket in the instance's folder, one JSON object back.
 
 mod client;
+mod in_use;
 mod lines;
 mod rate;
 mod server;
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use transport::Instance;
 
 pub use client::{ControlError, command};
+pub use in_use::await_tables;
 pub(crate) use server::{Asked, Server};
 
 /// Longest line of either side [bytes], its end included.

@@ -61,6 +61,8 @@ pub struct Counts {
     pub tier: u64,
     /// Generation of the parameters in use.
     pub table_active: u64,
+    /// Generation of the parameters that were refused last.
+    pub table_refused: u64,
     /// The supervisor's page: a [`chain::Mode`].
     pub mode: u64,
     /// The supervisor's page: changes of mode so far.
@@ -116,6 +118,7 @@ impl PageView {
             latency_ns: page.latency_ns.get(),
             tier: page.tier.get(),
             table_active: page.table_active.get(),
+            table_refused: page.table_refused.get(),
             mode: page.mode.get(),
             mode_changes: page.mode_changes.get(),
             modes_late: page.modes_late.get(),
