@@ -85,19 +85,77 @@ fn all_processes_killed_in_any_order_leave_nothing_that_hinders_the_next_start()
     }
 }
 
+/// Waits until every stage runs in its life of this number, as configured.
+fn wait_for_lives(run: &Run, lives: u64) {
+    run.wait_for(|status| {
+        let stages = status["stages"].as_array().unwrap();
+        stages.iter().all(|stage| {
+            (&stage["restarts"], &stage["state"], &stage["tier"])
+                == (&(lives - 1).into(), &"running".into(), &"configured".into())
+        })
+    });
+}
+
 #[test]
-fn deleted_shared_memory_is_noticed_and_the_chain_stops_in_order() {
+fn deleted_shared_memory_is_made_anew_without_a_loss_and_beyond_the_budget_the_chain_stops_in_order() {
     let run = Run::new(&["--duration", "forever"]);
     let child = run.start();
     run.wait_for_sweeps(5);
-    let deleted_ns = runtime::clock::now_ns();
+    let instance = transport::Instance::named(&run.instance).unwrap();
+    let before = instance.shared_memory().len();
+    // The shipped chain may be restarted twice within ten minutes.
+    for life in [2, 3] {
+        let deleted_ns = runtime::clock::now_ns();
+        run.inject(&["shared-memory-gone"]);
+        wait_for_lives(&run, life);
+        let took_s = (runtime::clock::now_ns() - deleted_ns) as f64 / 1e9;
+        println!("noticed, and all processes back, after {took_s:.1} s");
+        run.wait_for_more(3);
+        assert_eq!(instance.shared_memory().len(), before);
+    }
+    let named = |id: &str| run.events().iter().filter(|event| event["name"] == id).count();
+    assert_eq!([named("shared_memory_gone"), named("chain_restarted"), named("run_began")], [2, 2, 1]);
+    assert_eq!(named("stage_died"), 0, "all left in order");
     run.inject(&["shared-memory-gone"]);
     let run = run.collect(child).expect_code(1);
-    let took_s = (runtime::clock::now_ns() - deleted_ns) as f64 / 1e9;
-    println!("noticed, and stopped in order, after {took_s:.1} s");
     assert!(run.is_closed(), "{}", run.stdout());
-    assert!(run.stderr().contains("files of the chain in shared memory were deleted"), "{}", run.stderr());
+    assert_eq!(run.missing(), 0, "{}", run.stdout());
+    run.expect_every_sweep_accounted_for();
+    let said = run.stderr();
+    assert!(said.contains("files of the chain in shared memory were deleted"), "{said}");
+    assert!(said.contains("may be restarted 2 times within 600 s, and was"), "{said}");
     Run::new(&["--sweeps", "3", "--pace", "fast"]).finish().expect_code(0);
+}
+
+#[test]
+fn a_lossless_run_whose_shared_memory_is_deleted_ends_with_the_same_bytes() {
+    let args = ["--from", "config/scenes/box.toml", "--sweeps", "120", "--pace", "fast"];
+    let plain = Run::new(&args).finish().expect_code(0);
+    let run = Run::new(&args);
+    let child = run.start();
+    run.wait_for_sweeps(1);
+    run.inject(&["slow", "classifier", "--by", "20ms"]);
+    run.inject(&["shared-memory-gone"]);
+    wait_for_lives(&run, 2);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    assert!(run.bytes == plain.bytes);
+}
+
+#[test]
+fn a_stage_that_dies_while_there_is_no_shared_memory_to_join_comes_back_as_configured() {
+    let run = Run::new(&["--duration", "forever"]);
+    let child = run.start();
+    run.wait_for_sweeps(5);
+    run.inject(&["shared-memory-gone"]);
+    run.inject(&["kill", "extractor"]);
+    wait_for_lives(&run, 2);
+    run.wait_for_more(3);
+    run.wait_for_mode("nominal");
+    stop(&run);
+    let run = run.collect(child).expect_code(0);
+    assert!(run.is_closed(), "{}", run.stdout());
+    run.expect_every_sweep_accounted_for();
 }
 
 #[test]

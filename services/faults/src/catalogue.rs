@@ -258,7 +258,7 @@ catalogue! {
         Some(CommandRefused), "refused and counted",
         "A client sends commands without end.";
     SharedMemoryLost = 240, "shared-memory-gone", Chain, None, Once, "", Some(SharedMemoryGone),
-        "the chain is stopped in order, exit 1; the next start is clean",
+        "all processes leave in order and come back with new files; beyond the chain's budget the run ends with 1",
         "Somebody deletes the chain's files in shared memory.";
     CpuHog = 250, "cpu-hog", Machine, count("workers", 1.0, 64.0, 1.0), Time(5.0), "", Some(StepTaken),
         "steps down the ladder where cores are short",

@@ -7,6 +7,7 @@ use runtime::clock;
 use runtime::page::State;
 
 use crate::SupervisorError;
+use crate::child::Watched;
 use crate::watch::Watch;
 
 /// How long a stage may take to drain its input, and then to leave [ns].
@@ -19,11 +20,14 @@ impl Watch<'_> {
         for position in 0..self.stages.len() {
             let end_ns = clock::now_ns() + LEAVE_PATIENCE_NS;
             let mut drained = position == 0;
-            while !drained && clock::now_ns() < end_ns && !self.stages[position].told {
+            // Who is not there cannot drain, and has no successor before all have left.
+            let renewing = self.renewing;
+            let can_drain = |stage: &Watched| !stage.told && (!renewing || stage.is_up());
+            while !drained && clock::now_ns() < end_ns && can_drain(&self.stages[position]) {
                 self.look_once()?;
                 drained = self.is_drained(position);
             }
-            if !drained && !self.stages[position].told {
+            if !drained && can_drain(&self.stages[position]) {
                 tracing::error!(stage = self.stages[position].name, "did not drain its input within 5 s");
             }
             self.leave(position)?;

@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
-use runtime::Plan;
+use runtime::{Plan, clock};
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::Pid;
 use transport::Instance;
@@ -19,6 +19,7 @@ const START_LOCK: &str = ".lock";
 /// An instance that this process supervises.
 pub(crate) struct House {
     instance: Instance,
+    iceoryx2_config: String,
     _lock: File,
     adopted: Option<Adopted>,
 }
@@ -57,7 +58,8 @@ impl House {
         }
         // The stages look at the lock for a moment each, and find it taken from here on.
         let lock = mark(&instance.lock_path())?;
-        Ok(Self { instance: instance.clone(), _lock: lock, adopted })
+        let iceoryx2_config = settings.iceoryx2_config.to_owned();
+        Ok(Self { instance: instance.clone(), iceoryx2_config, _lock: lock, adopted })
     }
 
     /// Takes the instance as if nobody had been there, after all.
@@ -75,7 +77,13 @@ impl House {
         instance.make_private_dir()?;
         let lock = mark(&instance.lock_path())?;
         instance.write_config(iceoryx2_config, std::process::id())?;
-        Ok(Self { instance, _lock: lock, adopted: None })
+        Ok(Self { instance, iceoryx2_config: iceoryx2_config.to_owned(), _lock: lock, adopted: None })
+    }
+
+    /// Whoever joins the instance from now on finds nothing in shared memory of those who joined before.
+    pub(crate) fn begin_generation(&self) -> Result<(), SupervisorError> {
+        let generation = format!("{}-{}", std::process::id(), clock::now_ns() / 1_000_000);
+        Ok(self.instance.write_config(&self.iceoryx2_config, generation)?)
     }
 
     /// What there was to adopt.

@@ -27,6 +27,7 @@ mod processes;
 mod progress;
 mod reload;
 mod remains;
+mod renewal;
 mod report;
 mod restarts;
 mod scheduling;

@@ -81,7 +81,7 @@ impl Watch<'_> {
     /// be well, or the chain is ending.
     pub(crate) fn tell_manager(&mut self) {
         let now_ns = clock::now_ns();
-        let stopping = self.stop_asked || self.failed.is_some() || self.stages[0].told;
+        let stopping = self.stop_asked || self.failed.is_some() || (self.stages[0].told && !self.renewing);
         // What has to be known is said again until there is room for it.
         if stopping && !self.manager.stopping {
             self.manager.stopping = self.manager.tell("STOPPING=1\nSTATUS=stopping: each stage drains its input\n");

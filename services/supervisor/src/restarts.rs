@@ -171,10 +171,14 @@ impl Watch<'_> {
         }
         settle(&self.node, &self.services, &mut self.stages, position, ended);
         self.tell_losses(position, lost_before);
-        let stage = &mut self.stages[position];
-        if stage.told {
+        if self.stages[position].told {
             return Ok(false);
         }
+        if self.has_lost_services() {
+            // It comes back with all others, when there is something to join.
+            return Ok(false);
+        }
+        let stage = &self.stages[position];
         let name = stage.name.clone();
         let is_refused = ended == Ended::Code(CANNOT_START);
         if is_refused && !self.begun {
@@ -221,7 +225,7 @@ impl Watch<'_> {
     }
 
     /// Starts the next life of a stage, at the tier that it has come to.
-    fn start_again(&mut self, position: usize) -> Result<(), SupervisorError> {
+    pub(crate) fn start_again(&mut self, position: usize) -> Result<(), SupervisorError> {
         let tier = self.lives[position].tier();
         let stage = &mut self.stages[position];
         (stage.told, stage.recovering) = (false, true);

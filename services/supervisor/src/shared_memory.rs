@@ -3,8 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use events::{CHAIN, EventId};
-
+use crate::child::Watched;
+use crate::lives::Lives;
 use crate::watch::Watch;
 
 /// Files of services: there from the first process to the last.
@@ -25,6 +25,8 @@ pub(crate) struct SharedMemory {
     /// Were missing at the last look. A process that leaves takes its files with it a moment before it is seen to have left.
     missing: BTreeSet<String>,
     next_look_ns: u64,
+    /// Files were deleted, and all processes are to have new ones.
+    pub(crate) is_to_be_renewed: bool,
 }
 
 impl SharedMemory {
@@ -52,14 +54,20 @@ impl SharedMemory {
         self.writers.extend(names.into_iter().filter(|name| name.ends_with(OF_WRITERS)));
         gone
     }
+
+    /// How many files of services that should be there are missing. No process takes these with it.
+    pub(crate) fn missing_services(&self, names: &[String]) -> usize {
+        self.services.iter().filter(|service| !names.contains(*service)).count()
+    }
 }
 
 impl Watch<'_> {
-    /// Stops the chain in order when its files in shared memory were deleted: a process that starts later could not join it,
-    /// because the services can be created anew only when nobody has the old ones.
+    /// Looks whether files of the chain in shared memory were deleted: a process that starts later could not join it, because
+    /// services can be created anew only when nobody has the old ones.
     pub(crate) fn look_for_files(&mut self, now_ns: u64) {
-        let ending = self.stop_asked || self.failed.is_some() || self.stages.iter().any(|stage| stage.told);
-        if !self.begun || ending || !self.shared_memory.is_due(now_ns) {
+        let is_leaving = |(stage, lives): (&Watched, &Lives)| stage.told && !lives.is_given_up();
+        let leave = self.stop_asked || self.failed.is_some() || self.stages.iter().zip(&self.lives).any(is_leaving);
+        if !self.begun || leave || self.shared_memory.is_to_be_renewed || !self.shared_memory.is_due(now_ns) {
             return;
         }
         let beside = self.tape.iter().map(|tape| &tape.process);
@@ -67,9 +75,7 @@ impl Watch<'_> {
         let lives = lives.map(|one| one.page.incarnation.get() + one.page.settled_incarnation.get()).sum();
         let gone = self.shared_memory.gone(self.instance.shared_memory(), lives);
         if gone > 0 {
-            let text = format!("{gone} files of the chain in shared memory were deleted by somebody else");
-            self.say(EventId::SharedMemoryGone, CHAIN, &text);
-            self.failed = Some(format!("{text}: the chain was stopped"));
+            self.lose_shared_memory(gone);
         }
     }
 }
@@ -100,6 +106,14 @@ mod tests {
         let mut sut = SharedMemory::default();
         sut.gone(names(&["a.dynamic", "w.data"]), 5);
         assert_eq!((sut.gone(names(&[]), 6), sut.gone(names(&[]), 7)), (0, 1), "a service lives as long as the chain");
+    }
+
+    #[test]
+    fn services_are_missing_whoever_lives() {
+        let mut sut = SharedMemory::default();
+        sut.gone(names(&["a.dynamic", "b.dynamic", "w.data"]), 5);
+        assert_eq!(sut.missing_services(&names(&["b.dynamic", "a.dynamic"])), 0, "a writer may have gone");
+        assert_eq!(sut.missing_services(&names(&["b.dynamic", "w.data"])), 1);
     }
 
     #[test]

@@ -102,6 +102,7 @@ fn signals() -> Result<Receiver<i32>, SupervisorError> {
 
 /// A chain being watched.
 pub(crate) struct Watch<'a> {
+    pub(crate) house: &'a House,
     pub(crate) instance: &'a Instance,
     /// As it was last written.
     pub(crate) plan: Plan,
@@ -148,6 +149,8 @@ pub(crate) struct Watch<'a> {
     /// Every stage was up once.
     pub(crate) begun: bool,
     pub(crate) stop_asked: bool,
+    /// All processes leave in order, and come back.
+    pub(crate) renewing: bool,
     pub(crate) failed: Option<String>,
     /// What the pages counted when they last changed, and when that was.
     pub(crate) moved: u64,
@@ -176,6 +179,7 @@ impl<'a> Watch<'a> {
             executive: Executive::new(&plan.executive, names, plan.chain.sectors, now_ns),
             signs: Vec::new(),
             sampled_ns: now_ns + SAMPLE_NS,
+            house,
             instance,
             plan: plan.clone(),
             spawn,
@@ -210,6 +214,7 @@ impl<'a> Watch<'a> {
             as_before: None,
             begun: false,
             stop_asked: false,
+            renewing: false,
             failed: None,
             moved: 0,
             moved_ns: now_ns,
@@ -259,14 +264,18 @@ impl<'a> Watch<'a> {
     }
 
     /// Waits until the stages from `first` on are connected, restarting those that die on the way.
-    fn await_up(&mut self, first: usize) -> Result<(), SupervisorError> {
+    pub(crate) fn await_up(&mut self, first: usize) -> Result<(), SupervisorError> {
         // Somebody who starts stages by hand takes the time he takes.
         let patience_ns = if self.spawn { START_PATIENCE_NS } else { u64::MAX / 2 };
         let end_ns = clock::now_ns() + patience_ns;
         loop {
             self.look_once()?;
             let beside = self.tape.iter().filter(|tape| !tape.is_up()).map(|tape| &tape.process);
-            let missing: Vec<_> = self.stages[first..].iter().filter(|stage| !stage.is_up()).chain(beside).collect();
+            // Whoever was given up in the run so far is not to come.
+            let stays_away = |position: usize| self.begun && self.lives[position].is_given_up();
+            let awaited = (first..self.stages.len()).filter(|position| !stays_away(*position));
+            let awaited = awaited.map(|position| &self.stages[position]);
+            let missing: Vec<_> = awaited.filter(|stage| !stage.is_up()).chain(beside).collect();
             if self.stop_asked || missing.is_empty() {
                 return Ok(());
             }
@@ -285,7 +294,7 @@ impl<'a> Watch<'a> {
                 }
                 break;
             }
-            if let Err(error) = self.look_once() {
+            if let Err(error) = self.look_once().and_then(|()| self.renew_shared_memory_if_lost()) {
                 self.kill_all();
                 return Err(error);
             }

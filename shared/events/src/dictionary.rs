@@ -122,7 +122,7 @@ dictionary! {
     // 6xx: files
     FileFailed = 601, Error, "file_failed", "{a} files could not be written, {b} by now", "A file could not be written and is closed; what it lacks is counted.";
     FileRotated = 602, Info, "file_rotated", "file {a} of the recording is begun", "The recording goes on in the next file.";
-    SharedMemoryGone = 603, Error, "shared_memory_gone", "", "Somebody deleted files of the chain in shared memory: whoever starts later could not join. The chain is stopped in order; start it again.";
+    SharedMemoryGone = 603, Error, "shared_memory_gone", "", "Somebody deleted files of the chain in shared memory: whoever starts later could not join. All processes leave in order and come back with new ones; beyond the budget of the chain, or where others start the stages, the chain is stopped.";
 
     // 7xx: what the source sends, and what is in it
     SourceEnded = 701, Info, "source_ended", "after sweep {a}", "The recording, or what was asked for, has come to its end.";

@@ -1,3 +1,4 @@
+use std::fmt::Display;
 use std::fs;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -135,8 +136,9 @@ impl Instance {
 
     /// Writes the instance's iceoryx2 configuration: `template` with a root and prefix of its own.
     ///
-    /// `generation` tells this life of the instance from one that died while it created services.
-    pub fn write_config(&self, template: &str, generation: u32) -> Result<(), InstanceError> {
+    /// `generation` tells this life of the instance from one that died while it created services, or whose files in shared
+    /// memory were deleted; letters, digits or hyphens.
+    pub fn write_config(&self, template: &str, generation: impl Display) -> Result<(), InstanceError> {
         let path = self.config_path();
         let text = template
             .replace("@root@", &self.dir.display().to_string())
@@ -163,12 +165,18 @@ impl Instance {
         }
     }
 
-    /// Removes the folder and everything of the instance in shared memory. No process of it may be alive.
-    pub fn remove(&self) -> Result<(), InstanceError> {
-        for name in self.shared_memory() {
+    /// Removes these of [`Instance::shared_memory`], which nobody needs any more.
+    pub fn remove_from_shared_memory(&self, names: &[String]) -> Result<(), InstanceError> {
+        for name in names {
             let path = Path::new(SHARED_MEMORY_DIR).join(name);
             remove_if_there(fs::remove_file(&path)).map_err(|cause| InstanceError::Io { path, cause })?;
         }
+        Ok(())
+    }
+
+    /// Removes the folder and everything of the instance in shared memory. No process of it may be alive.
+    pub fn remove(&self) -> Result<(), InstanceError> {
+        self.remove_from_shared_memory(&self.shared_memory())?;
         remove_if_there(fs::remove_dir_all(&self.dir))
             .map_err(|cause| InstanceError::Io { path: self.dir.clone(), cause })
     }

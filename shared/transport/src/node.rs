@@ -1,3 +1,5 @@
+use std::fs;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use iceoryx2::config::ConfigCreationError;
@@ -24,6 +26,8 @@ const MAX_NODES: usize = 16;
 pub struct Node {
     node: iceoryx2::node::Node<Ipc>,
     queue_parts: usize,
+    /// The instance's configuration when it was joined, and where that stands.
+    joined_by: (PathBuf, Vec<u8>),
 }
 
 /// A service held open: as long as one lives the service exists.
@@ -70,6 +74,12 @@ impl Node {
         Self::with_config(instance, name, queue_parts, |path| Config::setup_global_config_from_file(path).cloned())
     }
 
+    /// Joins an instance as [`Node::join`] does, in a process that has joined it before, by the configuration that it has now.
+    /// Dead nodes without details are not cleaned any more; they hold nothing, and go with the instance.
+    pub fn join_anew(instance: &Instance, name: &str, queue_parts: usize) -> Result<Self, TransportError> {
+        Self::with_config(instance, name, queue_parts, Config::from_file)
+    }
+
     /// Visits an instance as a viewer: may only tap, and may visit another one afterwards, whose configuration differs
     /// though its name be the same.
     pub fn visit(instance: &Instance, name: &str, queue_parts: usize) -> Result<Self, TransportError> {
@@ -86,6 +96,8 @@ impl Node {
         set_log_level(LogLevel::Fatal);
         let fail = |cause: &dyn std::fmt::Debug| TransportError::new("join", instance.name(), cause);
         let path = FilePath::new(instance.config_path().as_os_str().as_encoded_bytes()).map_err(|e| fail(&e))?;
+        // Where it changes between the two it is joined once more.
+        let joined_by = (instance.config_path(), fs::read(instance.config_path()).map_err(|e| fail(&e))?);
         let config = read(&path).map_err(|e| fail(&e))?;
         let name = NodeName::new(name).map_err(|e| fail(&e))?;
         let node = NodeBuilder::new()
@@ -95,7 +107,13 @@ impl Node {
             .create::<Ipc>()
             .map_err(|e| fail(&e))?;
         instance.make_shared_memory_private();
-        Ok(Self { node, queue_parts })
+        Ok(Self { node, queue_parts, joined_by })
+    }
+
+    /// Whether the chain goes on with other files in shared memory than this process has: a viewer visits it anew.
+    pub fn is_left_behind(&self) -> bool {
+        let (path, text) = &self.joined_by;
+        fs::read(path).is_ok_and(|now| now != *text)
     }
 
     /// Creates the service of a message type and holds it open. The supervisor's alone.
