@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use messages::{Detections, Joiner, Raw, Sweep, Trace};
-use runtime::{Pace, Plan, Shutdown};
+use runtime::{Pace, Plan, Shutdown, clock};
 use tape::DetectionsJoiner;
 use transport::{Instance, Node, Tap};
 use zerocopy::FromZeros;
@@ -13,6 +13,10 @@ use crate::{ViewError, cloud, overview};
 
 /// Sweeps of which the numbers are kept: five minutes at 10 Hz.
 const ROWS: usize = 3_000;
+/// Between two looks whether the chain goes on with other files in shared memory [ns].
+const LOOK_NS: u64 = 1_000_000_000;
+/// What a viewer joins as.
+const NAME: &str = "view";
 /// Newest sweeps that can be shown; some 70 MB of an HDL-32E's.
 const SWEEPS: usize = 64;
 
@@ -21,7 +25,10 @@ pub struct Live {
     // The taps before the node whose guests they are.
     sweeps: Tap<Sweep>,
     detections: Tap<Detections>,
-    _node: Node,
+    node: Node,
+    instance: Instance,
+    queue_parts: usize,
+    next_look_ns: u64,
     shutdown: Shutdown,
     title: String,
     run: BTreeMap<String, String>,
@@ -49,7 +56,7 @@ impl Live {
     pub fn attach(instance: &Instance, most_points: usize) -> Result<Self, ViewError> {
         let plan = Plan::read(instance)?;
         let shutdown = Shutdown::install(plan.supervisor_pid)?;
-        let node = Node::visit(instance, "view", plan.chain.queue_parts())?;
+        let node = Node::visit(instance, NAME, plan.chain.queue_parts())?;
         let paced = plan.pace == Pace::Realtime;
         let mut run = BTreeMap::from([
             ("source".to_owned(), plan.source.from.file_name().unwrap_or_default().to_string_lossy().into_owned()),
@@ -61,7 +68,10 @@ impl Live {
         Ok(Self {
             sweeps: node.tap()?,
             detections: node.tap()?,
-            _node: node,
+            node,
+            instance: instance.clone(),
+            queue_parts: plan.chain.queue_parts(),
+            next_look_ns: 0,
             shutdown,
             title: instance.name().to_owned(),
             run,
@@ -79,11 +89,28 @@ impl Live {
         self.shutdown.asked() || self.shutdown.orphaned()
     }
 
+    /// Taps the chain anew where it goes on with other files in shared memory. It may not have made them yet.
+    fn follow(&mut self) {
+        if !self.node.is_left_behind() {
+            return;
+        }
+        let Ok(node) = Node::visit(&self.instance, NAME, self.queue_parts) else { return };
+        if let (Ok(sweeps), Ok(detections)) = (node.tap(), node.tap()) {
+            (self.sweeps, self.detections) = (sweeps, detections);
+            self.node = node;
+        }
+    }
+
     /// Takes what the chain has said since. To be called often: what is not taken in time is dropped, for us alone.
     ///
     /// # Errors
     /// Shared memory fails.
     pub fn take(&mut self) -> Result<(), ViewError> {
+        let now_ns = clock::now_ns();
+        if now_ns >= self.next_look_ns {
+            self.next_look_ns = now_ns + LOOK_NS;
+            self.follow();
+        }
         while let Some(taken) = self.sweeps.take()? {
             let part = taken.trace().part;
             if let Some(whole) = self.joiner.add(&part, taken.message()) {

@@ -142,7 +142,7 @@ impl<'a> Live<'a> {
         self.next_look_ns = clock::now_ns() + LOOK_NS;
         self.looks += 1;
         match &self.chain {
-            Some((feed, _)) => {
+            Some((feed, chain)) => {
                 let now_ns = feed.sensor_time_ns;
                 if self.server.wants(Topic::Status)
                     && let Some(status) = supervisor.status()
@@ -156,6 +156,12 @@ impl<'a> Live<'a> {
                 self.log.read(|event| told.push(event));
                 if !told.is_empty() {
                     self.server.offer(Topic::Events, now_ns, |out| encode_events(&told, now_ns, out));
+                }
+                if chain.node.is_left_behind()
+                    && let Ok(chain) = attach(self.instance)
+                {
+                    self.unseen = self.all_unseen();
+                    self.chain = Some(chain);
                 }
             }
             None if supervisor.runs() => {

@@ -66,8 +66,12 @@ impl Watch {
             return Ok(false);
         }
         self.model.sample(Sample::take(chain));
+        let left_behind = chain.node.is_left_behind();
         self.read_log();
         self.next_sample_ns = now_ns + self.interval_ns;
+        if left_behind && let Ok(chain) = attach(&self.instance) {
+            self.chain = Some(chain);
+        }
         if ended {
             self.chain = None;
             self.next_sample_ns = now_ns + LOOK_NS;
