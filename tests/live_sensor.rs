@@ -5,6 +5,7 @@
 mod support;
 
 use std::net::UdpSocket;
+use std::process::Stdio;
 use std::time::Duration;
 
 use support::{Run, encke, text};
@@ -64,6 +65,65 @@ fn a_live_sensor_gives_the_detections_of_its_capture() {
             assert_eq!(live[key], recorded[key], "{key} of sweep {}", recorded["sweep"]);
         }
     }
+}
+
+/// Packets as an early VLP-16 sends them at 10 Hz, which carry the HDL-32E's factory byte: 1327 µs apart, 4.8° each.
+fn of_a_vlp_16(count: u32) -> Vec<Vec<u8>> {
+    let packet = |number: u32| {
+        let mut bytes = vec![0; 1_206];
+        for block in 0..12 {
+            let at = block as usize * 100;
+            bytes[at..at + 2].copy_from_slice(&[0xFF, 0xEE]);
+            let azimuth_cdeg = (number * 480 + block * 40) % 36_000;
+            bytes[at + 2..at + 4].copy_from_slice(&(azimuth_cdeg as u16).to_le_bytes());
+            bytes[at + 4..at + 100].fill(9);
+        }
+        bytes[1_200..1_204].copy_from_slice(&(number * 1_327).to_le_bytes());
+        bytes[1_204..].copy_from_slice(&[0x37, 0x21]);
+        bytes
+    };
+    (0..count).map(packet).collect()
+}
+
+#[test]
+fn a_sensor_of_another_kind_is_refused_before_anything_starts_or_left_out_where_it_comes_later() {
+    let port = free_port();
+    let from = format!("udp://127.0.0.1:{port}");
+    let packets = of_a_vlp_16(1_000);
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let send = |packet: &Vec<u8>| {
+        // Nobody may be listening.
+        let _ = sender.send_to(packet, ("127.0.0.1", port));
+        std::thread::sleep(Duration::from_micros(1_300));
+    };
+    // Sends until the run has ended.
+    let read_as = |sensor: &str| {
+        let mut command = encke();
+        command.args(["run", "--sweeps", "2", "--from", &from, "--sensor", sensor]);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut all = packets.iter().cycle();
+        while child.try_wait().unwrap().is_none() {
+            all.next().into_iter().for_each(send);
+        }
+        let output = child.wait_with_output().unwrap();
+        (output.status.code(), text(&output.stderr))
+    };
+    let (code, said) = read_as("hdl-32e");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("its data packets are 1327 us apart, those of hdl-32e 553 us") && said.lines().count() == 1);
+    // The remedy is one.
+    let (code, said) = read_as("vlp-16");
+    assert_eq!(code, Some(0), "{said}");
+
+    let run = Run::new(&["--from", &from, "--sensor", "hdl-32e"]);
+    let child = run.start();
+    run.wait_for(|status| status["stages"].as_array().unwrap().iter().all(|stage| stage["state"] == "running"));
+    packets[..500].iter().for_each(send);
+    assert_eq!(run.status().unwrap()["sweep"], 0, "six turns, and no sweep of them");
+    run.ctl(&["stop"]);
+    let run = run.collect(child).expect_code(0);
+    let said = run.stderr();
+    assert!(said.contains("data packets that are 1327 us apart, those of hdl-32e 553 us"), "{said}");
 }
 
 #[test]

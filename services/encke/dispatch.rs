@@ -106,7 +106,10 @@ fn build_in(plan: &mut Plan, built_in: &Assets) {
 
 /// Builds everything that the plan names once, and gives the name of its sensor, so that what a stage would refuse is known before any process starts.
 pub(crate) fn check(plan: &Plan, assets: &Assets) -> Result<String, Failure> {
-    let sensor = sources::open(&plan.source, assets)?.sensor_name().to_owned();
+    let mut source = sources::open(&plan.source, assets)?;
+    source.check_sensor()?;
+    let sensor = source.sensor_name().to_owned();
+    drop(source);
     if plan.tape().is_some() {
         drop(taping::settings(assets)?);
     }

@@ -27,6 +27,14 @@ impl Opened {
             Self::Live(live) => live.sensor_name(),
         }
     }
+
+    /// Whether what comes at once is of that sensor; a recording was looked at when it was opened.
+    pub(crate) fn check_sensor(&mut self) -> Result<(), Failure> {
+        match self {
+            Self::Scene(_) | Self::Recording(_) => Ok(()),
+            Self::Live(live) => live.check_sensor().map_err(Failure::start),
+        }
+    }
 }
 
 /// Whether a source is a scene: by its ending, since a scene is configuration, not data.

@@ -78,7 +78,7 @@ pub enum ReplayError {
     #[error("{}: its data packets are {found_us} us apart, those of {sensor} {expected_us} us; name the right sensor with --sensor",
         path.display())]
     OtherSensor {
-        /// The capture.
+        /// The capture, or the live sensor's address.
         path: PathBuf,
         /// The sensor supposed.
         sensor: String,
@@ -86,6 +86,16 @@ pub enum ReplayError {
         found_us: u64,
         /// What the sensor model says [µs].
         expected_us: u64,
+    },
+    /// The packets say that they are another sensor's.
+    #[error("{}: its data packets are of {found}, read as {sensor}; name the right sensor with --sensor", path.display())]
+    OtherProduct {
+        /// The live sensor's address.
+        path: PathBuf,
+        /// The sensor supposed.
+        sensor: String,
+        /// What their factory byte says.
+        found: String,
     },
     /// The file has the format but nothing to replay.
     #[error("{}: {what}; give a recording that holds at least one return", path.display())]

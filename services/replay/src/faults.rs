@@ -50,6 +50,8 @@ pub enum Fault {
     OtherSender,
     /// A data packet of another kind of sensor than the one supposed.
     OtherProduct,
+    /// Live data packets as far apart as only another kind of sensor's are.
+    OtherSpacing,
     /// A live sensor's packet that came while the ring was full.
     RingFull,
     /// Datagrams that the kernel dropped before they could be taken.
@@ -58,7 +60,7 @@ pub enum Fault {
 
 impl Fault {
     /// All kinds.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::TornCapture,
         Self::BadFrame,
         Self::NoBlock,
@@ -80,6 +82,7 @@ impl Fault {
         Self::OtherLength,
         Self::OtherSender,
         Self::OtherProduct,
+        Self::OtherSpacing,
         Self::RingFull,
         Self::KernelDrop,
     ];
@@ -108,6 +111,7 @@ impl Fault {
             Self::OtherLength => "other_length",
             Self::OtherSender => "other_sender",
             Self::OtherProduct => "other_product",
+            Self::OtherSpacing => "other_spacing",
             Self::RingFull => "ring_full",
             Self::KernelDrop => "kernel_drop",
         }

@@ -237,6 +237,84 @@ fn a_field_of_view_shows_itself_over_a_socket_too() {
     assert_eq!(returns, 131_305);
 }
 
+/// Packets of a sensor that turns at 10 Hz, so far apart [µs], with this factory byte.
+fn turning(count: u64, step_us: u64, product_id: u8) -> Vec<Vec<u8>> {
+    let packet = |number: u64| {
+        let mut bytes = vec![0; 1_206];
+        for block in 0..12 {
+            let at = block as usize * 100;
+            bytes[at..at + 2].copy_from_slice(&[0xFF, 0xEE]);
+            // 36° in 10 ms.
+            let azimuth_cdeg = (number * step_us + block * step_us / 12) * 36_000 / 100_000 % 36_000;
+            bytes[at + 2..at + 4].copy_from_slice(&(azimuth_cdeg as u16).to_le_bytes());
+            bytes[at + 4..at + 100].fill(9);
+        }
+        bytes[1_200..1_204].copy_from_slice(&((number * step_us) as u32).to_le_bytes());
+        bytes[1_204..].copy_from_slice(&[0x37, product_id]);
+        bytes
+    };
+    (0..count).map(packet).collect()
+}
+
+/// Looks at the sensor while a thread sends these again and again, as a sensor does.
+fn checked(options: &Options, datagrams: Vec<Vec<u8>>) -> Result<(), ReplayError> {
+    let mut live = listening("udp://127.0.0.1:0", options);
+    let socket = sender(&live);
+    let ends = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut all = datagrams.iter().cycle();
+            while !ends.load(std::sync::atomic::Ordering::Relaxed) {
+                all.next().map(|datagram| socket.send(datagram).unwrap());
+                std::thread::sleep(std::time::Duration::from_micros(500));
+            }
+        });
+        let outcome = live.check_sensor();
+        ends.store(true, std::sync::atomic::Ordering::Relaxed);
+        outcome
+    })
+}
+
+// verifies RPL-032
+#[test]
+fn a_sensor_of_another_kind_is_refused_by_what_was_seen_and_its_own_and_a_silent_one_are_not() {
+    let vlp_16 = Options { sensor: Some("vlp-16".to_owned()), ..Options::default() };
+    // Early ones carry the HDL-32E's factory byte.
+    let error = checked(&Options::default(), turning(2_000, 1_327, 0x21)).unwrap_err().to_string();
+    let says = ": its data packets are 1327 us apart, those of hdl-32e 553 us; name the right sensor with --sensor";
+    assert!(error.starts_with("udp://127.0.0.1:0") && error.ends_with(says), "{error}");
+    let error = checked(&Options::default(), turning(2_000, 1_327, 0x22)).unwrap_err().to_string();
+    assert!(
+        error.ends_with(
+            ": its data packets are of vlp-16 (factory byte 0x22), read as hdl-32e; name the right sensor with --sensor"
+        ),
+        "{error}"
+    );
+    checked(&vlp_16, turning(2_000, 1_327, 0x21)).unwrap();
+    checked(&Options::default(), turning(2_000, 553, 0x21)).unwrap();
+    // Very old firmware.
+    checked(&Options::default(), turning(2_000, 553, 0x00)).unwrap();
+    on_loopback().check_sensor().unwrap();
+}
+
+// verifies RPL-032
+#[test]
+fn packets_of_another_kind_of_sensor_are_left_out_wherever_they_begin() {
+    let mut live = on_loopback();
+    let others = turning(400, 1_327, 0x21);
+    assert!(received(&mut live, &others).is_empty(), "five turns, and no sweep of them");
+    // The first nine tell.
+    assert_eq!(live.traffic().other_spacing(), 400 - 8);
+    let own = received(&mut live, &turning(1_000, 553, 0x21));
+    assert!(own.iter().filter(|sweep| sweep.header.is_complete()).count() >= 4, "{}", own.len());
+    // Its clock is behind the other's, so it takes some more to tell.
+    assert!(live.traffic().other_spacing() < 400 + 20, "{:?}", live.traffic());
+    let before = live.traffic().packets();
+    assert!(received(&mut live, &others).iter().all(|sweep| !sweep.header.is_complete()));
+    assert_eq!(live.traffic().packets(), before + 400);
+    assert!(live.faults().count(Fault::OtherSpacing) >= 2 * (400 - 8) - 100);
+}
+
 // verifies RPL-028
 #[test]
 fn a_port_that_is_taken_is_refused_in_one_line() {

@@ -4,17 +4,19 @@ use std::io::{self, ErrorKind};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 
+use lidar::SensorModel;
+
 use super::LiveAddress;
 use super::drops::KernelDrops;
 use crate::capture::Arrival;
 use crate::error::Place;
-use crate::velodyne::{PACKET_BYTES, Packet, is_of_another};
+use crate::velodyne::{PACKET_BYTES, Packet, SpacingWatch, is_of_another};
 
 /// Packets that the ring holds: a second of an HDL-32E, half of one in dual-return mode.
 const RING: usize = 2_048;
@@ -40,6 +42,9 @@ pub struct Traffic {
     other_length: AtomicU64,
     other_sender: AtomicU64,
     other_product: AtomicU64,
+    /// Factory byte of the latest of these.
+    other_id: AtomicU8,
+    other_spacing: AtomicU64,
     ring_full: AtomicU64,
     kernel_drops: AtomicU64,
 }
@@ -63,6 +68,16 @@ impl Traffic {
     /// Data packets that say to be of another kind of sensor.
     pub fn other_product(&self) -> u64 {
         self.other_product.load(Relaxed)
+    }
+
+    /// What the latest of these says of its sensor.
+    pub(super) fn other_id(&self) -> u8 {
+        self.other_id.load(Relaxed)
+    }
+
+    /// Of the packets taken, those that were left out because they are as far apart as only another kind of sensor's are.
+    pub fn other_spacing(&self) -> u64 {
+        self.other_spacing.load(Relaxed)
     }
 
     /// Data packets that came while the ring was full.
@@ -101,11 +116,14 @@ pub(crate) struct Intake {
     budget: u32,
     /// Waits in a row that brought nothing.
     silent: u32,
+    spacing: SpacingWatch,
+    /// Another kind of sensor has just begun to send.
+    has_changed: bool,
 }
 
 impl Intake {
     /// Opens the socket and starts the thread. `wall_ns` is the host's clock [ns since 1970].
-    pub(super) fn open(address: &LiveAddress, product_id: u8, wall_ns: fn() -> u64) -> io::Result<Self> {
+    pub(super) fn open(address: &LiveAddress, sensor: &SensorModel, wall_ns: fn() -> u64) -> io::Result<Self> {
         let socket = UdpSocket::bind(address.listen())?;
         match address.listen().ip() {
             IpAddr::V4(group) if group.is_multicast() => socket.join_multicast_v4(&group, &Ipv4Addr::UNSPECIFIED)?,
@@ -130,7 +148,7 @@ impl Intake {
             drops: KernelDrops::of(&socket),
             socket,
             address: *address,
-            product_id,
+            product_id: sensor.product_id(),
             wall_ns,
             ring: sender,
             traffic: Arc::clone(&traffic),
@@ -138,7 +156,19 @@ impl Intake {
         };
         let thread = std::thread::Builder::new().name("live sensor".to_owned()).spawn(|| post.serve())?;
         let name = PathBuf::from(address.to_string());
-        Ok(Self { name, local, ring, traffic, stop, thread: Some(thread), number: 0, budget: 0, silent: 0 })
+        Ok(Self {
+            name,
+            local,
+            ring,
+            traffic,
+            stop,
+            thread: Some(thread),
+            number: 0,
+            budget: 0,
+            silent: 0,
+            spacing: SpacingWatch::of(sensor),
+            has_changed: false,
+        })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -178,18 +208,45 @@ impl Intake {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// The next packet; nothing when none comes for a while, or it is time to look up.
+    /// The spacing of the packets, and what it should be [µs], where it is that of another kind of sensor.
+    pub(super) fn another_us(&self) -> Option<(u64, u64)> {
+        self.spacing.another_us().map(|found_us| (found_us, self.spacing.expected_us()))
+    }
+
+    /// Whether another kind of sensor has begun to send since this was asked last.
+    pub(super) fn take_change(&mut self) -> bool {
+        std::mem::take(&mut self.has_changed)
+    }
+
+    /// The next packet; nothing when none comes for a while, or it is time to look up. Those of another kind of sensor are
+    /// left out.
     pub(crate) fn next(&mut self, packet: &mut Packet) -> Option<Arrival> {
-        self.budget = self.budget.checked_sub(1)?;
+        loop {
+            self.budget = self.budget.checked_sub(1)?;
+            let Some((received, arrival)) = self.receive() else {
+                self.budget = 0;
+                return None;
+            };
+            let was_another = self.spacing.another_us().is_some();
+            self.spacing.look(&received);
+            if self.spacing.another_us().is_none() {
+                *packet = received;
+                return Some(arrival);
+            }
+            self.has_changed |= !was_another;
+            self.traffic.other_spacing.fetch_add(1, Relaxed);
+        }
+    }
+
+    /// The next packet, whatever it is; nothing when none comes for a while.
+    pub(super) fn receive(&mut self) -> Option<(Packet, Arrival)> {
         match self.ring.recv_timeout(WAIT) {
-            Ok(datagram) => {
-                packet.bytes = datagram.bytes;
+            Ok(Datagram { host_ns, bytes }) => {
                 self.silent = 0;
                 self.number += 1;
-                Some(Arrival { host_ns: datagram.host_ns, place: Place::Packet(self.number) })
+                Some((Packet { bytes }, Arrival { host_ns, place: Place::Packet(self.number) }))
             }
             Err(_) => {
-                self.budget = 0;
                 self.silent = self.silent.saturating_add(1);
                 None
             }
@@ -260,7 +317,9 @@ impl Post {
         let count = if !self.address.accepts(sender) {
             &traffic.other_sender
         } else if let Ok(&bytes) = <&[u8; PACKET_BYTES]>::try_from(bytes) {
-            if is_of_another(bytes[PACKET_BYTES - 1], self.product_id) {
+            let product_id = bytes[PACKET_BYTES - 1];
+            if is_of_another(product_id, self.product_id) {
+                traffic.other_id.store(product_id, Relaxed);
                 &traffic.other_product
             } else if self.ring.try_send(Datagram { host_ns, bytes }).is_ok() {
                 &traffic.packets

@@ -7,10 +7,12 @@ mod address;
 mod drops;
 mod intake;
 
+use std::fmt;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use lidar::SensorModel;
 use messages::{Message, Sweep, Truth};
 use stage::{Next, Source, SourceError};
 use zerocopy::FromZeros;
@@ -25,7 +27,10 @@ use crate::faults::{Fault, Faults};
 use crate::format::Format;
 use crate::intake::Limits;
 use crate::recording::{Options, SensorLookup};
-use crate::velodyne::{Progress, Sweeps};
+use crate::velodyne::{Packet, Probe, Progress, Sweeps, name_of};
+
+/// Waits of 20 ms without a packet after which a sensor is silent.
+const SILENT_WAITS: u32 = 10;
 
 /// Sweeps of a live sensor.
 ///
@@ -35,7 +40,7 @@ pub struct Live {
     sweeps: Sweeps,
     /// The sweep being gathered: between two calls it must not be touched.
     gathered: Box<Sweep>,
-    sensor_name: String,
+    sensor: SensorModel,
     local: SocketAddr,
     traffic: Arc<Traffic>,
     /// Of `traffic`, what is among the faults already.
@@ -46,11 +51,43 @@ pub struct Live {
 
 type Count = fn(&Traffic) -> u64;
 
-/// What of the traffic is a fault.
-const TRAFFIC_FAULTS: [(Fault, Count, &str); 5] = [
+const OTHER: &str = "data packets of another kind of sensor; name the right one with --sensor";
+
+/// A fault of the traffic with what was seen. Worded only where it is said.
+struct Seen<'a> {
+    fault: Fault,
+    what: &'static str,
+    sensor: &'a str,
+    other_id: u8,
+    /// What the packets are apart, and what they should be [µs].
+    spacing_us: Option<(u64, u64)>,
+}
+
+impl fmt::Display for Seen<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { fault, what, sensor, other_id, spacing_us } = self;
+        match (fault, spacing_us) {
+            (Fault::OtherProduct, _) => write!(
+                f,
+                "data packets of {}, read as {sensor}; name the right sensor with --sensor",
+                name_of(*other_id)
+            ),
+            (Fault::OtherSpacing, Some((found_us, expected_us))) => write!(
+                f,
+                "data packets that are {found_us} us apart, those of {sensor} {expected_us} us; name the right sensor \
+                 with --sensor"
+            ),
+            _ => f.write_str(what),
+        }
+    }
+}
+
+/// What of the traffic is a fault, and how that is said.
+const TRAFFIC_FAULTS: [(Fault, Count, &str); 6] = [
     (Fault::OtherLength, Traffic::other_length, "a datagram that is not as long as a data packet"),
     (Fault::OtherSender, Traffic::other_sender, "a datagram of a sender that is not accepted; see --from"),
-    (Fault::OtherProduct, Traffic::other_product, "a data packet of another kind of sensor; name it with --sensor"),
+    (Fault::OtherProduct, Traffic::other_product, OTHER),
+    (Fault::OtherSpacing, Traffic::other_spacing, OTHER),
     (Fault::RingFull, Traffic::ring_full, "a packet came while the ring was full"),
     (Fault::KernelDrop, Traffic::kernel_drops, "the kernel dropped datagrams; raise net.core.rmem_max"),
 ];
@@ -72,18 +109,18 @@ pub fn listen(
     let limits = Limits::checked(options.min_range_m.unwrap_or(near_m), options.max_range_m.unwrap_or(far_m))?;
     let socket = |source| ReplayError::Socket { address: address.to_string(), source };
     let gathered = Sweep::new_box_zeroed().map_err(|_| socket(std::io::ErrorKind::OutOfMemory.into()))?;
-    let intake = Intake::open(address, sensor.product_id(), wall_ns).map_err(socket)?;
+    let intake = Intake::open(address, &sensor, wall_ns).map_err(socket)?;
     let (local, traffic) = (intake.local(), Arc::clone(intake.traffic()));
     let sweeps = Sweeps::new(Capture::Live(Box::new(intake)), &sensor, limits, options.both_returns)?;
     Ok(Live {
         sweeps,
         gathered,
-        sensor_name: sensor.name().to_owned(),
+        patience: Duration::from_secs_f64(2.0 / sensor.rotation_hz()[0]),
+        sensor,
         local,
         traffic,
         noted: [0; TRAFFIC_FAULTS.len()],
         faults: Faults::default(),
-        patience: Duration::from_secs_f64(2.0 / sensor.rotation_hz()[0]),
     })
 }
 
@@ -95,7 +132,36 @@ impl Live {
 
     /// Name of the sensor model that packets are read with.
     pub fn sensor_name(&self) -> &str {
-        &self.sensor_name
+        self.sensor.name()
+    }
+
+    /// Looks at the first packets, for a caller who would rather not begin with the wrong sensor model: a tenth of a second's,
+    /// which are gone then. A sensor that is silent for 0.2 s is not waited for; what comes later is looked at as it comes.
+    ///
+    /// # Errors
+    /// They are another kind of sensor's, by their factory byte or by the time between them.
+    pub fn check_sensor(&mut self) -> Result<(), ReplayError> {
+        let Some(intake) = self.intake() else { return Ok(()) };
+        let path = intake.path().to_owned();
+        let mut waits = 0;
+        let next = |packet: &mut Packet| {
+            while waits < SILENT_WAITS {
+                if let Some((received, _)) = intake.receive() {
+                    *packet = received;
+                    return Ok(true);
+                }
+                waits += 1;
+            }
+            Ok(false)
+        };
+        match Probe::look(path.clone(), next)? {
+            Some(probe) => probe.check_rate(&self.sensor),
+            None if self.traffic.other_product() > 0 => {
+                let (sensor, found) = (self.sensor.name().to_owned(), name_of(self.traffic.other_id()));
+                Err(ReplayError::OtherProduct { path, sensor, found })
+            }
+            None => Ok(()),
+        }
     }
 
     /// What was found wrong so far.
@@ -117,9 +183,12 @@ impl Live {
 
     /// Adds what arrived since the last call to the faults.
     fn note_traffic(&mut self, number: u64) {
+        let spacing_us = self.intake().and_then(|intake| intake.another_us());
         for ((fault, count, what), noted) in TRAFFIC_FAULTS.into_iter().zip(&mut self.noted) {
             let count = count(&self.traffic);
             if count > *noted {
+                let (sensor, other_id) = (self.sensor.name(), self.traffic.other_id());
+                let what = Seen { fault, what, sensor, other_id, spacing_us };
                 let path = self.sweeps.capture().path();
                 self.faults.note(fault, count - *noted, path, Place::Packet(number), what);
                 *noted = count;
@@ -156,7 +225,13 @@ impl Source for Live {
         }
         self.note_traffic(number);
         let failed = |error: ReplayError| SourceError(error.to_string());
-        match self.sweeps.next(&mut self.gathered, &mut self.faults).map_err(failed)? {
+        let progress = self.sweeps.next(&mut self.gathered, &mut self.faults).map_err(failed)?;
+        if self.intake().is_some_and(Intake::take_change) {
+            // It began with another kind of sensor's packets.
+            self.sweeps.discard(&mut self.gathered);
+            return Ok(Next::Nothing);
+        }
+        match progress {
             Progress::Sweep => Ok(self.give(sweep)),
             Progress::Nothing if is_silent && self.sweeps.flush(&mut self.gathered) => Ok(self.give(sweep)),
             Progress::Nothing => Ok(Next::Nothing),

@@ -11,10 +11,12 @@ mod packet;
 mod product;
 mod rate;
 mod slots;
+mod spacing;
 mod sweeps;
 
 pub use encode::{PacketWriter, PcapStamps, WriteError};
 pub(crate) use packet::{PACKET_BYTES, Packet};
-pub(crate) use product::is_of_another;
+pub(crate) use product::{is_of_another, name_of};
 pub(crate) use rate::Probe;
+pub(crate) use spacing::SpacingWatch;
 pub(crate) use sweeps::{Progress, Sweeps, to_frame};

@@ -1,19 +1,18 @@
-//! What the first packets of a capture say of their sensor.
+//! What the first packets of a capture, or of a live sensor, say of their sensor.
 
 use std::path::PathBuf;
 
 use lidar::SensorModel;
 
-use super::packet::{BLOCKS, HOUR_US, Packet};
+use super::packet::Packet;
 use super::product::sensor_of;
+use super::spacing::{Spacing, expected_us, is_another};
 use crate::capture::{Capture, Got};
 use crate::error::ReplayError;
 use crate::faults::Faults;
 
-/// Packets that are looked at.
-const PROBED: usize = 100;
-/// Fewer of them say nothing.
-const FEW: usize = 8;
+/// Packets that are looked at, at most.
+const LOOKED_AT: usize = 1_000;
 
 /// The first data packets of a capture.
 #[derive(Clone, Debug)]
@@ -35,35 +34,35 @@ impl Probe {
         let path = capture.path().to_owned();
         // The reader proper will find them again, and count them.
         let mut faults = Faults::muted();
-        let mut packet = Packet::default();
-        let (mut steps_us, mut before_us) = (Vec::with_capacity(PROBED), None);
-        let (mut product_id, mut is_dual) = (None, false);
-        for _ in 0..10 * PROBED {
-            let Got::Packet(_) = capture.next(&mut packet, &mut faults)? else { break };
-            if !(0..BLOCKS).any(|block| packet.is_block(block)) {
-                continue;
-            }
-            product_id = product_id.or(Some(packet.product_id()));
-            is_dual = packet.is_dual();
-            let stamp_us = packet.stamp_us() % HOUR_US;
-            let step_us = (stamp_us + HOUR_US - before_us.unwrap_or(stamp_us)) % HOUR_US;
-            // Packets may have been recorded twice, on two interfaces say: only those ahead of all before count.
-            if step_us < HOUR_US / 2 {
-                before_us = Some(stamp_us);
-                steps_us.extend((step_us > 0).then_some(step_us));
-            }
-            if steps_us.len() == PROBED {
+        let found = Self::look(path.clone(), |packet| Ok(matches!(capture.next(packet, &mut faults)?, Got::Packet(_))));
+        capture.rewind();
+        found?.ok_or_else(|| {
+            let what = "holds no Velodyne data packet (1206 bytes with blocks FF EE)".to_owned();
+            ReplayError::Empty { path, what }
+        })
+    }
+
+    /// Looks at data packets as long as `next` gives some, until they say enough; none where there is none.
+    ///
+    /// # Errors
+    /// Those of `next`.
+    pub(crate) fn look(
+        path: PathBuf,
+        mut next: impl FnMut(&mut Packet) -> Result<bool, ReplayError>,
+    ) -> Result<Option<Self>, ReplayError> {
+        let (mut packet, mut spacing) = (Packet::default(), Spacing::default());
+        let mut found: Option<(u8, bool)> = None;
+        for _ in 0..LOOKED_AT {
+            if spacing.is_enough() || !next(&mut packet)? {
                 break;
             }
+            if spacing.add(&packet) {
+                let product_id = found.map_or(packet.product_id(), |(product_id, _)| product_id);
+                found = Some((product_id, packet.is_dual()));
+            }
         }
-        capture.rewind();
-        let Some(product_id) = product_id else {
-            let what = "holds no Velodyne data packet (1206 bytes with blocks FF EE)".to_owned();
-            return Err(ReplayError::Empty { path, what });
-        };
-        steps_us.sort_unstable();
-        let step_us = (steps_us.len() >= FEW).then(|| steps_us[steps_us.len() / 2]);
-        Ok(Self { path, product_id, is_dual, step_us })
+        let step_us = spacing.usual_us();
+        Ok(found.map(|(product_id, is_dual)| Self { path, product_id, is_dual, step_us }))
     }
 
     /// The sensor model that the factory byte names; very old firmware has other content there.
@@ -77,9 +76,8 @@ impl Probe {
     /// They come at another rate.
     pub(crate) fn check_rate(self, sensor: &SensorModel) -> Result<(), ReplayError> {
         let Some(found_us) = self.step_us else { return Ok(()) };
-        let cycles = BLOCKS as u64 * u64::from(sensor.cycles_per_block()) / if self.is_dual { 2 } else { 1 };
-        let expected_us = (cycles * u64::from(sensor.cycle_ns()) + 500) / 1_000;
-        if found_us.abs_diff(expected_us) * 5 > expected_us {
+        let expected_us = expected_us(sensor, self.is_dual);
+        if is_another(found_us, expected_us) {
             let sensor = sensor.name().to_owned();
             return Err(ReplayError::OtherSensor { path: self.path, sensor, found_us, expected_us });
         }
