@@ -151,6 +151,25 @@ fn a_slow_stage_is_told_apart_from_a_stopped_one() {
     assert_eq!(run.process("clusterer")["restarts"], 0);
 }
 
+#[test]
+fn a_stage_that_computes_for_longer_than_a_stopped_one_may_stand_is_slow_all_the_same() {
+    let run = Run::new(&LIGHT);
+    let child = run.start();
+    run.wait_for_sweeps(10);
+    let mut events = Events::of(&run);
+    run.inject(&["slow", "clusterer", "--by", "300ms"]);
+    events.wait_for("stage_slow", "clusterer");
+    run.wait_for_more(3);
+    run.inject(&["slow", "clusterer", "--by", "0ms"]);
+    events.wait_for("stage_well", "clusterer");
+    stop(&run);
+    let run = run.collect(child).expect_code(0);
+    let said = events.names();
+    let wrong = ["stage_hung", "stage_spinning", "stage_silent", "stage_killed"];
+    assert!(said.iter().all(|(name, _)| !wrong.contains(&name.as_str())), "{said:?}");
+    assert_eq!(run.process("clusterer")["restarts"], 0);
+}
+
 /// Runs undisturbed to its end; what was said of stages and limits.
 fn said_of(args: &[&str]) -> Vec<Value> {
     let run = Run::new(args);

@@ -236,7 +236,7 @@ catalogue! {
     Stop = 201, "stop", Process, None, Time(0.5), "hung", Some(StageHung), "old parts refused; restarted where it lasts",
         "Stands still (SIGSTOP, then SIGCONT).";
     Slow = 202, "slow", Stage, SLOWER, Open, "slow", Some(StepTaken), "steps down the ladder of overload",
-        "Sleeps for a time on each sweep.";
+        "Takes a time more on each sweep: sleeps, or computes from 100 ms on.";
     Swallow = 203, "swallow", Stage, None, Times(1), "", None, "the ledger is OPEN, the run ends with 1",
         "Loses a part and says nothing. Not survivable: it shows that the ledger is true.";
     KillSupervisor = 210, "kill-supervisor", Chain, None, Once, "", Some(SupervisorAdopted),

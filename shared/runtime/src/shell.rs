@@ -16,6 +16,9 @@ const PATIENCE_NS: u64 = 10_000_000_000;
 /// The longest sleep without a look at signals and requests.
 pub(crate) const IDLE: Duration = Duration::from_millis(50);
 
+/// Time on purpose from which on a stage computes and does not sleep [ns]: below the least that is called hung.
+const LONG_NS: u64 = 100_000_000;
+
 /// Parts after which memory is warm and allocations are counted.
 pub(crate) const WARM_UP_PARTS: u64 = 20;
 
@@ -116,12 +119,19 @@ impl Shell {
         tracing::debug!(stage = self.name, incarnation = self.incarnation, "running");
     }
 
-    /// Makes the work on a sweep longer, with its last part, where a fault on purpose asks for it.
+    /// Makes the work on a sweep longer, with its last part, where a fault on purpose asks for it. What is long computes, as a
+    /// slow stage does: who sleeps for so long waits in vain, as far as anybody can tell.
     pub(crate) fn slow_down(&self, part: Part) {
         let slow_ns = self.page.slow_ns.get();
-        if slow_ns > 0 && part.is_last() {
-            clock::sleep_ns(slow_ns);
+        if slow_ns == 0 || !part.is_last() {
+            return;
         }
+        if slow_ns < LONG_NS {
+            clock::sleep_ns(slow_ns);
+            return;
+        }
+        let end_ns = clock::now_ns() + slow_ns;
+        while clock::now_ns() < end_ns && !self.leaving() {}
     }
 
     /// Says on the page what happened at part `ordinal`, `parts` of which are concerned.
