@@ -100,8 +100,11 @@ impl Taping {
 
     fn save_counts(&self) {
         let json = serde_json::to_vec(&self.tape.counts()).unwrap_or_default();
+        // As a whole or not at all: who comes after a death goes on behind what it says.
+        let scratch = self.counts_path.with_extension("part");
+        let written = std::fs::write(&scratch, json).and_then(|()| std::fs::rename(&scratch, &self.counts_path));
         // A full disk costs the count, not the chain.
-        if let Err(error) = std::fs::write(&self.counts_path, json) {
+        if let Err(error) = written {
             tracing::error!(%error, "what was recorded could not be counted");
         }
     }
