@@ -214,4 +214,7 @@ fn nothing_older_than_allowed_is_answered_though_its_stage_had_looked_at_its_age
     }
     let causes = run.report["deadline"]["causes"].as_object().unwrap();
     assert!(causes.keys().any(|cause| cause == "recorder stale"), "{causes:?}");
+    // Of three digits.
+    let oldest_ms = run.report["latency_ms"]["end_to_end"]["max"].as_f64().unwrap();
+    assert!(oldest_ms <= 400.4, "{oldest_ms} ms");
 }

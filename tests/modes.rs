@@ -64,11 +64,8 @@ fn hundreds_of_mode_changes_take_effect_within_two_sweeps_each_and_none_is_stuck
         "--chain",
         chain.as_str(),
     ]);
-    // Nobody reads what it says before its end, and on a busy machine it has more to say than a pipe holds.
-    let child = run.start_with(|mut command| {
-        command.env("RUST_LOG", "off");
-        command
-    });
+    // Nobody reads what it says before its end, and on a busy machine it has more to say than a pipe holds: nobody waits for that.
+    let child = run.start();
     run.wait_for_sweeps(5);
     let walk = [
         (Word::Pause, "paused"),
@@ -85,8 +82,12 @@ fn hundreds_of_mode_changes_take_effect_within_two_sweeps_each_and_none_is_stuck
         commanded(&run, word);
         in_effect(&run, mode);
     }
-    // At a hundred sweeps a second a busy machine drops more than the ledger keeps by name.
     let run = stop(run, child, 0);
+    // At a hundred sweeps a second a busy machine drops more than the ledger keeps by name: the latest 128 gaps of a stage.
+    let gaps = run.report["ledger"]["gaps"].as_array().unwrap();
+    if gaps.iter().all(|gap| gaps.iter().filter(|other| other["stage"] == gap["stage"]).count() < 128) {
+        run.expect_every_sweep_accounted_for();
+    }
     let modes = &run.report["modes"];
     println!("{modes}");
     assert_eq!((modes["changes"].as_u64().unwrap(), modes["late"].as_u64().unwrap()), (mode_changes(), 0), "{modes}");
