@@ -7,7 +7,7 @@ use runtime::clock;
 use runtime::page::State;
 
 use crate::SupervisorError;
-use crate::child::Watched;
+use crate::processes::child::Watched;
 use crate::watch::Watch;
 
 /// How long a stage may take to drain its input, and then to leave [ns].

@@ -8,7 +8,7 @@ use messages::Verdict;
 use runtime::page::{Heard, Page, Said};
 use runtime::{Plan, TAPE, clock};
 
-use crate::child::Ended;
+use crate::processes::child::Ended;
 use crate::watch::Watch;
 
 /// Warnings of a kind that the terminal is told at once, and then in a second. The log has them all.

@@ -1,9 +1,11 @@
 //! Commands to a running chain: one JSON object a line through a socket in the instance's folder, one JSON object back.
 
 mod client;
+pub(crate) mod commands;
 mod in_use;
 mod lines;
 mod rate;
+mod reload;
 mod server;
 
 use std::collections::BTreeMap;

@@ -4,7 +4,7 @@ use runtime::page::{Page, State};
 use runtime::{Pace, Plan};
 
 use super::activity::Activity;
-use crate::child::Watched;
+use crate::processes::child::Watched;
 
 /// What is known of one process at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

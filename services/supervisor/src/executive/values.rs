@@ -10,7 +10,7 @@ use runtime::{Pace, Plan};
 use transport::Instance;
 
 use super::Executive;
-use crate::child::Watched;
+use crate::processes::child::Watched;
 
 const MIB: f64 = 1024.0 * 1024.0;
 /// The unit of a file's allocated blocks, whatever the file system's own (stat(2)).

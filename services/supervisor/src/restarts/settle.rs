@@ -7,8 +7,8 @@ use runtime::clock;
 use runtime::page::State;
 use transport::Node;
 
-use crate::child::{Ended, Watched};
-use crate::services::Services;
+use crate::house::services::Services;
+use crate::processes::child::{Ended, Watched};
 
 /// How long the next stage may take to drain what the dead one had sent [ns].
 const DRAIN_PATIENCE_NS: u64 = 300_000_000;

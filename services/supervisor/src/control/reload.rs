@@ -5,8 +5,8 @@ use chain::executive::{Executive, ExecutiveFile};
 use events::{CHAIN, EventId};
 use runtime::clock;
 
-use crate::budget::Restarts;
 use crate::control::{Answer, Tables};
+use crate::restarts::budget::Restarts;
 use crate::telling::bounds;
 use crate::watch::Watch;
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use transport::Instance;
 
 use crate::executive::condition_name;
-use crate::processes::cpu_and_memory;
+use crate::processes::usage::cpu_and_memory;
 
 /// A running chain at this moment.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]

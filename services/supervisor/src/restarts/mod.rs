@@ -1,5 +1,11 @@
 //! After a death, and deaths on order: who is started again, how, and how often.
 
+pub(crate) mod budget;
+pub(crate) mod lives;
+mod renewal;
+pub(crate) mod settle;
+pub(crate) mod shared_memory;
+
 use chain::executive::Action;
 use events::{CHAIN, EventId};
 use runtime::page::Tier;
@@ -7,11 +13,11 @@ use runtime::realtime::AsBefore;
 use runtime::{TAPE, clock};
 
 use crate::SupervisorError;
-use crate::child::Ended;
 use crate::executive::Order;
-use crate::lives::{After, LOWER_LIVES};
 use crate::modes::By;
-use crate::settle::settle;
+use crate::processes::child::Ended;
+use crate::restarts::lives::{After, LOWER_LIVES};
+use crate::restarts::settle::settle;
 use crate::watch::{CANNOT_START, Watch};
 
 /// How long processes may take to be gone after a kill [ns].

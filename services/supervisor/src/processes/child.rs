@@ -9,9 +9,9 @@ use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open, pidfd_s
 use transport::Instance;
 
 use crate::SupervisorError;
-use crate::budget::Restarts;
-use crate::processes::Usage;
-use crate::remains::{stage_of, stage_process};
+use crate::house::remains::{stage_of, stage_process};
+use crate::processes::usage::Usage;
+use crate::restarts::budget::Restarts;
 
 /// How a stage's process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

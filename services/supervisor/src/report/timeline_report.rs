@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use recorder::{SweepTimeline, TimelineSnapshot};
 use serde::{Deserialize, Serialize};
 
-use crate::timeline::{PROCESSES, Timeline, Used};
+use crate::report::timeline::{PROCESSES, Timeline, Used};
 
 /// How a run went over time. All times count from its start [s]; the first bucket of sweeps may begin before it.
 ///
@@ -77,7 +77,7 @@ impl TimelineReport {
             report.sample_t_s.push(from_start_s(begin_ns));
             report.add_sample(used, processes);
         }
-        let event = |event: &crate::timeline::Happened| Event {
+        let event = |event: &crate::report::timeline::Happened| Event {
             t_s: from_start_s(event.at_ns),
             kind: event.kind.to_owned(),
             what: event.what.clone(),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use messages::Step;
 use recorder::{Percentiles, WorstHop, WorstSweep};
 
-use crate::beside::RecordingReport;
+use crate::processes::beside::RecordingReport;
 use crate::report::{LEAST_MARGIN_PCT, TraceReport};
 use crate::{By, Report, SafeReport};
 

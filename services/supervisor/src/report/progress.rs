@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 use runtime::Plan;
 use runtime::logging::Stderr;
 
-use crate::child::Watched;
+use crate::processes::child::Watched;
 
 const TERMINAL_PERIOD_NS: u64 = 200_000_000;
 const LOG_PERIOD_NS: u64 = 5_000_000_000;

@@ -10,8 +10,8 @@ use tape::Counts;
 use transport::Instance;
 
 use crate::SupervisorError;
-use crate::child::{Ended, Watched};
-use crate::settle::CLEAN_PATIENCE;
+use crate::processes::child::{Ended, Watched};
+use crate::restarts::settle::CLEAN_PATIENCE;
 use crate::watch::{CANNOT_START, Watch};
 
 /// How long the tape may take to drain what a dead stage had sent [ns]. What it does not is lost to it.

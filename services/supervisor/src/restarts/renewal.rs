@@ -8,8 +8,8 @@ use runtime::realtime::AsBefore;
 use transport::Node;
 
 use crate::SupervisorError;
-use crate::services::Services;
-use crate::shared_memory::SharedMemory;
+use crate::house::services::Services;
+use crate::restarts::shared_memory::SharedMemory;
 use crate::watch::Watch;
 
 impl Watch<'_> {

@@ -5,10 +5,10 @@ use runtime::page::PageMap;
 use runtime::{Plan, clock};
 
 use crate::SupervisorError;
-use crate::beside::Tape;
-use crate::child::Watched;
 use crate::house::House;
-use crate::overload::Trouble;
+use crate::modes::overload::Trouble;
+use crate::processes::beside::Tape;
+use crate::processes::child::Watched;
 use crate::watch::Watch;
 
 /// The processes that a supervisor looks after.

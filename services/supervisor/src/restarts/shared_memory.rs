@@ -3,8 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::child::Watched;
-use crate::lives::Lives;
+use crate::processes::child::Watched;
+use crate::restarts::lives::Lives;
 use crate::watch::Watch;
 
 /// Files of services: there from the first process to the last.

@@ -4,12 +4,12 @@ use recorder::Snapshot;
 use runtime::page::Page;
 use runtime::{Plan, clock};
 
-use crate::events_report::EventsReport;
-use crate::ledger;
-use crate::overload::OverloadReport;
-use crate::processes::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS};
+use crate::modes::overload::OverloadReport;
+use crate::processes::usage::{ProcessReport, SETTLE_NS, SETTLE_SWEEPS};
+use crate::report::events_report::EventsReport;
+use crate::report::ledger;
+use crate::report::timeline_report::TimelineReport;
 use crate::report::{Facts, Report};
-use crate::timeline_report::TimelineReport;
 use crate::watch::Watch;
 
 impl Watch<'_> {

@@ -7,8 +7,8 @@ use runtime::page::Tier;
 use runtime::{Pace, clock};
 use serde::{Deserialize, Serialize};
 
+use crate::modes::overload::{Move, Trouble};
 use crate::modes::{By, Passed, Seen, Wish};
-use crate::overload::{Move, Trouble};
 use crate::watch::Watch;
 
 /// How the chain first came into safe mode.

@@ -5,8 +5,8 @@ use std::fs;
 use rustix::param::{clock_ticks_per_second, page_size};
 use serde::{Deserialize, Serialize};
 
-use crate::child::Watched;
-use crate::scheduling::Scheduling;
+use crate::processes::child::Watched;
+use crate::processes::scheduling::Scheduling;
 
 /// Resident memory counts as the first after this time and so many sweeps, whichever is later.
 pub(crate) const SETTLE_NS: u64 = 5_000_000_000;

@@ -1,6 +1,9 @@
 //! What the chain as a whole is to do, and since when it does: from what was commanded and where the ladder of overload
 //! stands, to what the source is told.
 
+pub(crate) mod overload;
+pub(crate) mod steering;
+
 use chain::Mode;
 use messages::Step;
 use serde::{Deserialize, Serialize};

@@ -1,3 +1,14 @@
+//! What a run was: its account, its statistics, its timeline, and how all of it is told.
+
+mod closing;
+pub(crate) mod events_report;
+pub(crate) mod ledger;
+pub(crate) mod progress;
+pub(crate) mod status;
+pub(crate) mod summary;
+pub(crate) mod timeline;
+pub(crate) mod timeline_report;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use chain::Mode;
@@ -6,16 +17,16 @@ use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, WorstSweep};
 use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
-use crate::beside::RecordingReport;
 use crate::control::CommandsReport;
-use crate::events_report::EventsReport;
-use crate::ledger::LedgerReport;
-use crate::machine::MachineLoad;
+use crate::modes::overload::OverloadReport;
+use crate::modes::steering::SafeReport;
 use crate::modes::{By, ModesReport};
-use crate::overload::OverloadReport;
-use crate::processes::ProcessReport;
-use crate::steering::SafeReport;
-use crate::timeline_report::TimelineReport;
+use crate::processes::beside::RecordingReport;
+use crate::processes::machine::MachineLoad;
+use crate::processes::usage::ProcessReport;
+use crate::report::events_report::EventsReport;
+use crate::report::ledger::LedgerReport;
+use crate::report::timeline_report::TimelineReport;
 
 /// Everything that is known of a run, as `--report` writes it.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -366,7 +377,7 @@ fn machine() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ledger::{GapReport, HopReport};
+    use crate::report::ledger::{GapReport, HopReport};
 
     fn hop(stage: &str, dropped: u64, lost: u64) -> HopReport {
         HopReport {

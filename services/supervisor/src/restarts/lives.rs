@@ -4,7 +4,7 @@
 use chain::RestartBudget;
 use runtime::page::Tier;
 
-use crate::budget::Restarts;
+use crate::restarts::budget::Restarts;
 
 /// Lives that a stage has at each tier below the configured one within the window, before the next is tried.
 pub(crate) const LOWER_LIVES: u32 = 3;

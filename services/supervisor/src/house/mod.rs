@@ -1,5 +1,9 @@
 //! One supervisor per instance, and nothing left behind by those that died.
 
+pub(crate) mod adopting;
+pub(crate) mod remains;
+pub(crate) mod services;
+
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -10,7 +14,7 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::process::Pid;
 use transport::Instance;
 
-use crate::remains::{living, take_down};
+use crate::house::remains::{living, take_down};
 use crate::{Settings, SupervisorError};
 
 /// Orders the starts and clean-ups of all instances of a user.

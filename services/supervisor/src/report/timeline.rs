@@ -2,9 +2,9 @@
 
 use recorder::{Buckets, Merge};
 
-use crate::child::Ended;
-use crate::machine::Shares;
-use crate::processes::Usage;
+use crate::processes::child::Ended;
+use crate::processes::machine::Shares;
+use crate::processes::usage::Usage;
 
 /// Most buckets of samples.
 const MOST: usize = 600;
