@@ -8,16 +8,20 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput};
 use lidar::{Column, ObstacleClass, Return, Ring};
-use messages::{ClusterSummary, Cutter, Detection, Detections, Part, Solid, Sweep, Trace, Truth};
+use messages::{
+    ClusterSummary, Cutter, Detection, Detections, MAX_TRACKS, Part, Solid, Sweep, Trace, Track, TrackState,
+    TrackTable, Truth,
+};
 use rustix::time::{ClockId, clock_gettime};
 use simulator::{SceneFile, Simulator};
 use tape::{About, Compression, Tape, TapeFile, Topic};
 use zerocopy::FromZeros;
 
-/// A sweep in one part, with its detections and truth.
+/// A sweep in one part, with its detections, tracks and truth.
 struct Input {
     sweep: Box<Sweep>,
     detections: Box<Detections>,
+    tracks: Box<TrackTable>,
     truth: Box<Truth>,
 }
 
@@ -31,7 +35,7 @@ fn default_scene(sweeps: u64) -> Vec<Input> {
         simulator.sweep(number, &mut sweep, &mut truth);
         Cutter::new(1).measure(&mut sweep);
         let detections = detections(&sweep, |place| truth.owners[place].into());
-        Input { sweep, detections, truth }
+        Input { sweep, tracks: tracks(number, &detections), detections, truth }
     };
     (0..sweeps).map(one).collect()
 }
@@ -68,7 +72,7 @@ fn dense(sweeps: u64) -> Vec<Input> {
         sweep.header.recorded = sweep.returns.len() as u32;
         Cutter::new(1).measure(&mut sweep);
         let detections = detections(&sweep, |place| place as u32 / 100);
-        Input { sweep, detections, truth: Truth::new_box_zeroed().unwrap() }
+        Input { sweep, tracks: tracks(number, &detections), detections, truth: Truth::new_box_zeroed().unwrap() }
     };
     (0..sweeps).map(&mut one).collect()
 }
@@ -101,6 +105,40 @@ fn detections(sweep: &Sweep, owner: impl Fn(usize) -> u32) -> Box<Detections> {
     whole
 }
 
+/// A track for each cluster, whose numbers differ from sweep to sweep as those of a filter do.
+fn tracks(sweep: u64, detections: &Detections) -> Box<TrackTable> {
+    let mut table = TrackTable::new_box_zeroed().unwrap();
+    table.time_ns = detections.header.sensor_time_ns + 100_000_000;
+    let mut seed = sweep as u32;
+    let mut noise = move || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) as f32 / 16_777_216.0
+    };
+    for (place, detection) in detections.detections.iter().take(MAX_TRACKS).enumerate() {
+        let track = Track {
+            id: 1_025 + place as u64,
+            last_seen_ns: table.time_ns - u64::from(detection.summary.last_offset_ns),
+            valid_until_ns: table.time_ns + 500_000_000,
+            position_m: detection.summary.centroid_m.map(|at| at + noise()),
+            velocity_mps: [0; 3].map(|_| noise()),
+            covariance: [0; 21].map(|_| noise()),
+            size_m: [0; 3].map(|_| noise()),
+            size_sigma_m: [0; 3].map(|_| noise()),
+            attitude_wxyz: [1.0, noise(), noise(), noise()],
+            posterior: detection.posterior,
+            keys: 1,
+            first_key: place as u32,
+            age_sweeps: 1 + sweep as u32,
+            state: TrackState::Confirmed,
+            class: detection.class,
+            ..Track::default()
+        };
+        table.tracks.push(track).unwrap();
+        table.keys.push(detection.summary.key).unwrap();
+    }
+    table
+}
+
 /// What this thread has had of the processor: others may have the rest.
 fn cpu_time() -> Duration {
     let time = clock_gettime(ClockId::ThreadCPUTime);
@@ -113,6 +151,7 @@ fn give(tape: &mut Tape, number: u64, input: &Input) {
     tape.truth(number, &trace, &input.truth);
     tape.sweep(number, &trace, &input.sweep);
     tape.detections(number, &trace, &input.detections);
+    tape.tracks(number, &trace, &input.tracks);
     if number % 10 == 9 {
         tape.checkpoint(number);
     }
@@ -122,7 +161,7 @@ fn bench(c: &mut Criterion) {
     let folder = tempfile::tempdir().unwrap();
     let shipped: TapeFile = toml::from_str(include_str!("../../../config/tape.toml")).unwrap();
     let (scene, hall) = (default_scene(10), dense(10));
-    let replay = vec![Topic::RawSweep, Topic::RawDetections];
+    let replay = vec![Topic::RawSweep, Topic::RawDetections, Topic::RawTracks];
     for (name, inputs) in [("default", &scene), ("dense", &hall)] {
         let mut group = c.benchmark_group(name);
         group.throughput(Throughput::Elements(inputs[0].sweep.returns.len() as u64));

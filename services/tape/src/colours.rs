@@ -2,7 +2,8 @@
 //!
 //! From the palette of Okabe and Ito (Color Universal Design, 2008), those that are bright enough for a dark ground, and
 //! a light grey. Seen without one of the three kinds of cones (model of Machado et al. 2009, full severity), the nearest
-//! two are still 16 apart in CIELAB (sky blue and bluish green, tritanopia; 18 and more otherwise).
+//! two are still 16 apart in CIELAB (sky blue and bluish green, tritanopia; 18 and more otherwise). Magenta is none of
+//! theirs: of the colours looked at it stands out most among them, and is 16 and more from each of them for all eyes.
 
 use lidar::ObstacleClass;
 
@@ -16,6 +17,8 @@ pub const CYLINDRICAL: [u8; 3] = [0, 158, 115];
 pub const CONICAL: [u8; 3] = [213, 94, 0];
 /// Grey: no class.
 pub const UNCLASSIFIED: [u8; 3] = [190, 190, 190];
+/// Magenta: likelier to be met than allowed, whatever its class. What it says is said by a word, too.
+pub const ALERT: [u8; 3] = [255, 0, 255];
 
 /// The colour of a class: red, green, blue, 0 to 255.
 pub const fn colour(class: ObstacleClass) -> [u8; 3] {

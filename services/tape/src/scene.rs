@@ -2,34 +2,31 @@
 
 use std::fmt::Write;
 
-use foxglove::messages::scene_entity_deletion::Type;
-use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, KeyValuePair, Pose, Quaternion, SceneEntity, SceneEntityDeletion,
-    SceneUpdate, SpherePrimitive, Vector3,
-};
-use lidar::ObstacleClass;
+use foxglove::messages::SceneEntity;
 use messages::{Detection, Detections, Solid};
-use prost::Message;
 
-use crate::cloud::FRAME_ID;
 use crate::colours::colour;
-use crate::stamps::{duration, timestamp};
+use crate::entities::{Entities, draw, draw_ball, paint, pose};
+use crate::stamps::timestamp;
 
 /// Diameter of the ball that stands for an obstacle without a solid [m].
 pub const CENTROID_M: f64 = 0.1;
 /// How opaque a solid is, 0 to 1: its returns are seen through it.
-const OPACITY: f64 = 0.4;
+pub(crate) const OPACITY: f64 = 0.4;
 /// Sweeps after which obstacles disappear when no newer ones come.
 const LIFETIME_SWEEPS: u64 = 2;
 /// Keys of what an entity says of its obstacle, in their order.
 const KEYS: [&str; 4] = ["class", "posterior", "points", "range_m"];
 
-/// Writes scene updates. Keeps its memory.
-#[derive(Default)]
+/// Writes scene updates of detections. Keeps its memory.
 pub struct Scenes {
-    update: SceneUpdate,
-    /// Entities that the latest update had no use for.
-    spare: Vec<SceneEntity>,
+    entities: Entities,
+}
+
+impl Default for Scenes {
+    fn default() -> Self {
+        Self { entities: Entities::new(&KEYS) }
+    }
 }
 
 impl Scenes {
@@ -41,36 +38,22 @@ impl Scenes {
     pub fn detections(&mut self, detections: &Detections, out: &mut Vec<u8>) {
         let header = &detections.header;
         let stamp = timestamp(header.sensor_time_ns);
-        let all = SceneEntityDeletion { timestamp: Some(stamp), r#type: Type::All as i32, id: String::new() };
-        self.update.deletions.clear();
-        self.update.deletions.push(all);
-        self.spare.append(&mut self.update.entities);
+        self.entities.begin(stamp);
         for (number, detection) in detections.detections.iter().enumerate() {
-            let mut entity = self.spare.pop().unwrap_or_else(new_entity);
-            entity.timestamp = Some(stamp);
-            entity.lifetime = Some(duration(header.period_ns.saturating_mul(LIFETIME_SWEEPS)));
-            entity.id.clear();
+            let entity = self.entities.add(stamp, header.period_ns.saturating_mul(LIFETIME_SWEEPS));
             // Writing to a string cannot fail, here and below.
             let _ = write!(entity.id, "obstacle-{number}");
-            describe(&mut entity, detection);
+            describe(entity, detection);
             let solid = detection.solid_place().and_then(|place| detections.solids.get(place));
-            draw(&mut entity, detection, solid);
-            self.update.entities.push(entity);
+            show(entity, detection, solid);
         }
-        out.reserve(self.update.encoded_len());
-        let _ = self.update.encode(out);
+        self.entities.end(out);
     }
-}
-
-fn new_entity() -> SceneEntity {
-    let pair = |key: &str| KeyValuePair { key: key.into(), value: String::new() };
-    SceneEntity { frame_id: FRAME_ID.into(), metadata: KEYS.map(pair).into(), ..SceneEntity::default() }
 }
 
 fn describe(entity: &mut SceneEntity, detection: &Detection) {
     for pair in &mut entity.metadata {
         let value = &mut pair.value;
-        value.clear();
         let _ = match pair.key.as_str() {
             "class" => value.write_str(detection.class.name()),
             "posterior" => match detection.class.solid_index() {
@@ -83,48 +66,28 @@ fn describe(entity: &mut SceneEntity, detection: &Detection) {
     }
 }
 
-fn draw(entity: &mut SceneEntity, detection: &Detection, solid: Option<&Solid>) {
-    entity.cubes.clear();
-    entity.spheres.clear();
-    entity.cylinders.clear();
-    let [r, g, b] = colour(detection.class).map(|part| f64::from(part) / 255.0);
-    let color = Some(Color { r, g, b, a: OPACITY });
-    let Some(solid) = solid else {
-        let pose = pose(detection.summary.centroid_m, [1.0, 0.0, 0.0, 0.0]);
-        let color = Some(Color { r, g, b, a: 1.0 });
-        let size = Some(Vector3 { x: CENTROID_M, y: CENTROID_M, z: CENTROID_M });
-        entity.spheres.push(SpherePrimitive { pose, size, color });
-        return;
-    };
-    let (pose, size) = (pose(solid.centre_m, solid.attitude_wxyz), Some(vector(solid.size_m)));
-    let mut cylinder =
-        |top_scale| entity.cylinders.push(CylinderPrimitive { pose, size, bottom_scale: 1.0, top_scale, color });
-    match detection.class {
-        ObstacleClass::Ellipsoidal => entity.spheres.push(SpherePrimitive { pose, size, color }),
-        ObstacleClass::Cylindrical => cylinder(1.0),
-        ObstacleClass::Conical => cylinder(0.0),
-        ObstacleClass::Rectangular | ObstacleClass::Unclassified => {
-            entity.cubes.push(CubePrimitive { pose, size, color });
+fn show(entity: &mut SceneEntity, detection: &Detection, solid: Option<&Solid>) {
+    let rgb = colour(detection.class);
+    match solid {
+        Some(solid) => {
+            let pose = pose(solid.centre_m, solid.attitude_wxyz);
+            draw(entity, detection.class, pose, solid.size_m, paint(rgb, OPACITY));
         }
+        None => draw_ball(entity, detection.summary.centroid_m, CENTROID_M, paint(rgb, 1.0)),
     }
-}
-
-fn pose(position_m: [f32; 3], attitude_wxyz: [f32; 4]) -> Option<Pose> {
-    let [w, x, y, z] = attitude_wxyz.map(f64::from);
-    Some(Pose { position: Some(vector(position_m)), orientation: Some(Quaternion { x, y, z, w }) })
-}
-
-fn vector(of: [f32; 3]) -> Vector3 {
-    let [x, y, z] = of.map(f64::from);
-    Vector3 { x, y, z }
 }
 
 #[cfg(test)]
 mod tests {
+    use foxglove::messages::scene_entity_deletion::Type;
+    use foxglove::messages::{Quaternion, SceneUpdate, Vector3};
+    use lidar::ObstacleClass;
     use messages::ClusterSummary;
+    use prost::Message;
     use zerocopy::FromZeros;
 
     use super::*;
+    use crate::stamps::duration;
 
     fn message(classes: &[(ObstacleClass, bool)]) -> Box<Detections> {
         let mut message = Detections::new_box_zeroed().unwrap();
@@ -157,7 +120,7 @@ mod tests {
         let all = ObstacleClass::ALL.map(|class| (class, class != ObstacleClass::Unclassified));
         let update = update(&mut Scenes::default(), &message(&all));
         let [cube, ball, cylinder, cone, loose] = &update.entities[..] else { panic!("{}", update.entities.len()) };
-        let place = pose([1.0, 2.0, 3.0], [0.5, -0.5, 0.5, -0.5]);
+        let place = Some(pose([1.0, 2.0, 3.0], [0.5, -0.5, 0.5, -0.5]));
         let size = Some(Vector3 { x: 4.0, y: 5.0, z: 6.0 });
         assert_eq!((cube.cubes[0].pose, cube.cubes[0].size), (place, size));
         assert_eq!((ball.spheres[0].pose, ball.spheres[0].size), (place, size));
@@ -166,7 +129,7 @@ mod tests {
             assert_eq!((drawn.pose, drawn.size), (place, size));
             assert_eq!((drawn.bottom_scale, drawn.top_scale), (1.0, top_scale));
         }
-        assert_eq!(loose.spheres[0].pose, pose([3.0, 4.0, 0.0], [1.0, 0.0, 0.0, 0.0]));
+        assert_eq!(loose.spheres[0].pose, Some(pose([3.0, 4.0, 0.0], [1.0, 0.0, 0.0, 0.0])));
         assert_eq!(place.unwrap().orientation, Some(Quaternion { w: 0.5, x: -0.5, y: 0.5, z: -0.5 }));
         let primitives = |entity: &SceneEntity| entity.cubes.len() + entity.spheres.len() + entity.cylinders.len();
         assert!(update.entities.iter().all(|entity| primitives(entity) == 1));

@@ -4,7 +4,7 @@ mod account;
 
 use std::path::Path;
 
-use messages::{Clusters, Descriptors, Detections, Joiner, Raw, Sweep, Trace, Truth};
+use messages::{Clusters, Descriptors, Detections, Joiner, Raw, Sweep, Trace, TrackTable, Truth};
 
 use crate::cloud::Clouds;
 use crate::early::{Early, Moment, What};
@@ -16,6 +16,7 @@ use crate::scene::Scenes;
 use crate::settings::{Settings, TapeError};
 use crate::stream::Stream;
 use crate::topic::Topic;
+use crate::tracks::TrackScenes;
 use crate::words::{Event, put_truth};
 
 /// A recording being written. Host time (UTC) comes with every call; nothing is read here but files.
@@ -25,6 +26,7 @@ pub struct Tape {
     joiner: Joiner,
     detections: Stream,
     detections_joiner: DetectionsJoiner,
+    tracks: Stream,
     truths: Stream,
     /// Parts by ordinal.
     raw_clusters: Stream,
@@ -33,6 +35,7 @@ pub struct Tape {
     first_sweep: u64,
     clouds: Clouds,
     scenes: Scenes,
+    track_scenes: TrackScenes,
     buffer: Vec<u8>,
     early: Early,
     /// Sensor time of the newest sweep [ns].
@@ -74,6 +77,7 @@ impl Tape {
             joiner: Joiner::new().ok_or(TapeError::Memory)?,
             detections: Stream::new(first),
             detections_joiner: DetectionsJoiner::new().ok_or(TapeError::Memory)?,
+            tracks: Stream::new(first),
             truths: Stream::new(first),
             raw_clusters: Stream::new(first_part),
             raw_descriptors: Stream::new(first_part),
@@ -81,6 +85,7 @@ impl Tape {
             first_sweep: first,
             clouds: Clouds::default(),
             scenes: Scenes::default(),
+            track_scenes: TrackScenes::default(),
             buffer: Vec::new(),
             early: Early::default(),
             sensor_time_ns: None,
@@ -132,9 +137,7 @@ impl Tape {
         self.detections.end(part.sweep);
         let stamps = Stamps { log_time_ns: whole.header.sensor_time_ns, utc_ns, sequence: part.sweep as u32 };
         if self.reels.settings().has(Topic::RawDetections) {
-            self.buffer.clear();
-            trace.write_raw(&mut self.buffer);
-            whole.write_raw(&mut self.buffer);
+            put_raw(trace, whole, &mut self.buffer);
             self.reels.write(Topic::RawDetections, &stamps, &self.buffer);
         }
         if self.reels.settings().has(Topic::Detections) {
@@ -147,6 +150,27 @@ impl Tape {
             if self.pairs.detections(part.sweep, whole, settled, &mut self.clouds, &mut self.buffer) {
                 self.reels.write(Topic::Clusters, &stamps, &self.buffer);
             }
+        }
+    }
+
+    /// Takes the tracks that came with a part of a sweep's detections: those of the last part are written, also where
+    /// the tracker could not answer and there is no table; all before it have none. Those of an earlier sweep that have
+    /// not come by then are given up.
+    pub fn tracks(&mut self, utc_ns: u64, trace: &Trace, table: &TrackTable) {
+        let part = &trace.part;
+        if !self.tracks.takes(part.sweep, part.sector) || !part.is_last() {
+            return;
+        }
+        self.tracks.end(part.sweep);
+        let stamps = Stamps { log_time_ns: part.sensor_time_ns, utc_ns, sequence: part.sweep as u32 };
+        if self.reels.settings().has(Topic::RawTracks) {
+            put_raw(trace, table, &mut self.buffer);
+            self.reels.write(Topic::RawTracks, &stamps, &self.buffer);
+        }
+        if self.reels.settings().has(Topic::Tracks) {
+            self.buffer.clear();
+            self.track_scenes.tracks(table, &mut self.buffer);
+            self.reels.write(Topic::Tracks, &stamps, &self.buffer);
         }
     }
 
@@ -183,10 +207,8 @@ impl Tape {
     }
 
     fn raw_part(&mut self, topic: Topic, utc_ns: u64, trace: &Trace, sensor_time_ns: u64, piece: &impl Raw) {
-        self.buffer.clear();
-        trace.write_raw(&mut self.buffer);
-        piece.write_raw(&mut self.buffer);
         let stamps = Stamps { log_time_ns: sensor_time_ns, utc_ns, sequence: trace.part.sweep as u32 };
+        put_raw(trace, piece, &mut self.buffer);
         self.reels.write(topic, &stamps, &self.buffer);
     }
 
@@ -244,9 +266,10 @@ impl Tape {
     /// Gives up what has not come, completes the file and closes it. Nothing is to be handed over afterwards. An error
     /// where a write error cost messages; [`Tape::counts`] says more.
     pub fn finish(&mut self, utc_ns: u64) -> Result<(), TapeError> {
-        let seen = self.sweeps.seen().max(self.detections.seen());
-        self.sweeps.give_up_below(seen);
-        self.detections.give_up_below(seen);
+        let seen = self.sweeps.seen().max(self.detections.seen()).max(self.tracks.seen());
+        for stream in [&mut self.sweeps, &mut self.detections, &mut self.tracks] {
+            stream.give_up_below(seen);
+        }
         self.sensor_time_ns.get_or_insert(0);
         self.write_early();
         self.reels.finish(utc_ns);
@@ -259,4 +282,11 @@ impl Tape {
             None => Ok(()),
         }
     }
+}
+
+/// Makes a trace and the message behind it all of `out`.
+fn put_raw(trace: &Trace, message: &impl Raw, out: &mut Vec<u8>) {
+    out.clear();
+    trace.write_raw(out);
+    message.write_raw(out);
 }

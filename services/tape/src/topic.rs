@@ -2,7 +2,7 @@
 
 use foxglove::messages::{Log, PointCloud, SceneUpdate};
 use foxglove::{Encode, Schema};
-use messages::{Clusters, Descriptors, Detections, Message, Sweep};
+use messages::{Clusters, Descriptors, Detections, Message, Sweep, TrackTable};
 use serde::{Deserialize, Serialize};
 
 use crate::schemas::{STATUS, TRUTH};
@@ -22,6 +22,9 @@ pub enum Topic {
     /// Fitted solids, for people.
     #[serde(rename = "detections")]
     Detections,
+    /// Obstacles through time, for people.
+    #[serde(rename = "tracks")]
+    Tracks,
     /// What the simulator knows.
     #[serde(rename = "truth")]
     Truth,
@@ -43,14 +46,18 @@ pub enum Topic {
     /// The detections of a sweep without loss.
     #[serde(rename = "raw/detections")]
     RawDetections,
+    /// The tracks at the end of a sweep without loss.
+    #[serde(rename = "raw/tracks")]
+    RawTracks,
 }
 
 impl Topic {
     /// All topics, by their number.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Sweep,
         Self::Clusters,
         Self::Detections,
+        Self::Tracks,
         Self::Truth,
         Self::Events,
         Self::Status,
@@ -58,6 +65,7 @@ impl Topic {
         Self::RawClusters,
         Self::RawDescriptors,
         Self::RawDetections,
+        Self::RawTracks,
     ];
 
     /// The channel's name in the file.
@@ -66,6 +74,7 @@ impl Topic {
             Self::Sweep => "/encke/sweep",
             Self::Clusters => "/encke/clusters",
             Self::Detections => "/encke/detections",
+            Self::Tracks => "/encke/tracks",
             Self::Truth => "/encke/truth",
             Self::Events => "/encke/events",
             Self::Status => "/encke/status",
@@ -73,15 +82,18 @@ impl Topic {
             Self::RawClusters => "/encke/raw/clusters",
             Self::RawDescriptors => "/encke/raw/descriptors",
             Self::RawDetections => "/encke/raw/detections",
+            Self::RawTracks => "/encke/raw/tracks",
         }
     }
 
     /// How the channel's messages are written: `protobuf`, `json`, or `encke` for [`messages::Raw`].
     pub const fn message_encoding(self) -> &'static str {
         match self {
-            Self::Sweep | Self::Clusters | Self::Detections | Self::Events => "protobuf",
+            Self::Sweep | Self::Clusters | Self::Detections | Self::Tracks | Self::Events => "protobuf",
             Self::Truth | Self::Status => "json",
-            Self::RawSweep | Self::RawClusters | Self::RawDescriptors | Self::RawDetections => "encke",
+            Self::RawSweep | Self::RawClusters | Self::RawDescriptors | Self::RawDetections | Self::RawTracks => {
+                "encke"
+            }
         }
     }
 
@@ -93,7 +105,7 @@ impl Topic {
         let known = |schema: Option<Schema>| schema.unwrap_or_else(|| raw(""));
         match self {
             Self::Sweep | Self::Clusters => known(PointCloud::get_schema()),
-            Self::Detections => known(SceneUpdate::get_schema()),
+            Self::Detections | Self::Tracks => known(SceneUpdate::get_schema()),
             Self::Events => known(Log::get_schema()),
             Self::Truth => json("encke.Truth", TRUTH),
             Self::Status => json("encke.Status", STATUS),
@@ -101,6 +113,7 @@ impl Topic {
             Self::RawClusters => raw(Clusters::TYPE),
             Self::RawDescriptors => raw(Descriptors::TYPE),
             Self::RawDetections => raw(Detections::TYPE),
+            Self::RawTracks => raw(TrackTable::TYPE),
         }
     }
 }

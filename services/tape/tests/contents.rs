@@ -8,7 +8,7 @@ use common::{
     PERIOD_NS, Read, UTC_NS, bytes, empty, give, give_many, made, of, read, sequences, settings, shipped, start,
 };
 use foxglove::messages::{Log, PointCloud, SceneUpdate};
-use messages::{Clusters, Descriptors, Detections, Raw, Sweep, Trace};
+use messages::{Clusters, Descriptors, Detections, Raw, Sweep, Trace, TrackTable};
 use prost::Message;
 use tape::{Event, Level, Tape, TapeFile, Topic};
 
@@ -58,10 +58,38 @@ fn detections_read_back_to_the_bit_behind_the_trace_of_the_last_part() {
 }
 
 #[test]
+fn tracks_read_back_to_the_bit_behind_the_trace_of_the_last_part() {
+    for sectors in [1, 36] {
+        let (read, _) = recorded(&[Topic::RawTracks], sectors, 3);
+        assert_eq!(read.len(), 3);
+        for (number, read) in read.iter().enumerate() {
+            let made = made(number as u64);
+            let (trace, rest) = Trace::read_raw(&read.data).unwrap();
+            assert_eq!((trace, rest), (made.trace(sectors - 1, sectors), &bytes(&*made.tracks)[..]));
+            let mut again = empty::<TrackTable>();
+            again.read_raw(rest).unwrap();
+            assert_eq!(again.keys_of(&again.tracks[1]), made.tracks.keys_of(&made.tracks.tracks[1]));
+        }
+    }
+}
+
+#[test]
+fn every_track_is_an_entity_of_its_sweeps_update() {
+    let (read, _) = recorded(&[Topic::Tracks], 36, 2);
+    for (number, read) in read.iter().enumerate() {
+        let update = SceneUpdate::decode(&read.data[..]).unwrap();
+        let ids: Vec<&str> = update.entities.iter().map(|entity| entity.id.as_str()).collect();
+        assert_eq!(ids, ["track-1025", "track-1026", "track-1027"]);
+        let end_ns = 5_000_000_000 + (number as u64 + 1) * PERIOD_NS;
+        assert_eq!(update.entities[0].timestamp.unwrap().nsec(), (end_ns % 1_000_000_000) as u32);
+    }
+}
+
+#[test]
 fn a_message_has_sensor_time_host_time_and_the_sweeps_number() {
     let (read, _) = recorded(&shipped().topics, 3, 3);
-    for topic in [Topic::Sweep, Topic::Clusters, Topic::Detections, Topic::Truth, Topic::RawSweep, Topic::RawDetections]
-    {
+    let of_sweeps = shipped().topics.into_iter().filter(|topic| !matches!(topic, Topic::Events | Topic::Status));
+    for topic in of_sweeps {
         let read = of(&read, topic);
         assert_eq!(read.len(), 3, "{topic:?}");
         for (number, read) in read.iter().enumerate() {
@@ -222,7 +250,7 @@ fn the_same_messages_at_the_same_times_are_the_same_bytes() {
             let mut tape = start(settings, &path, 1);
             give_many(&mut tape, 0..20);
             tape.finish(UTC_NS).unwrap();
-            assert_eq!(read(&path).len(), 120);
+            assert_eq!(read(&path).len(), 160);
             std::fs::read(path).unwrap()
         });
         assert!(files[0] == files[1]);

@@ -5,6 +5,7 @@
 mod common;
 
 use common::{Made, UTC_NS, give, made, read, sequences, settings, shipped, start};
+use messages::{Message, Trace};
 use tape::{Tape, Topic};
 
 const SECTORS: u32 = 3;
@@ -22,15 +23,17 @@ fn detections(tape: &mut Tape, made: &Made, sectors: &[u32]) {
     for &sector in sectors {
         let (trace, piece) = &parts[sector as usize];
         tape.detections(UTC_NS, trace, piece);
+        tape.tracks(UTC_NS, trace, &made.tracks_with(trace));
     }
 }
 
-/// Numbers of the sweeps written and lost, of sweeps, detections and clusters.
+/// Numbers of the sweeps written and lost, of sweeps, detections, clusters and tracks.
 #[derive(Debug, PartialEq)]
 struct Outcome {
     sweeps: (Vec<u32>, u64),
     detections: (Vec<u32>, u64),
     clusters: (Vec<u32>, u64),
+    tracks: (Vec<u32>, u64),
 }
 
 fn outcome(hold_sweeps: usize, feed: impl FnOnce(&mut Tape)) -> (Outcome, tape::Counts) {
@@ -53,6 +56,7 @@ fn outcome(hold_sweeps: usize, feed: impl FnOnce(&mut Tape)) -> (Outcome, tape::
         sweeps: both(Topic::RawSweep, Topic::Sweep),
         detections: both(Topic::RawDetections, Topic::Detections),
         clusters: both(Topic::Clusters, Topic::Clusters),
+        tracks: both(Topic::RawTracks, Topic::Tracks),
     };
     (outcome, counts)
 }
@@ -70,7 +74,8 @@ fn a_sweep_that_lacks_a_sector_is_lost_and_its_detections_are_not() {
                 detections(tape, &made, &ALL);
             }
         });
-        let expected = Outcome { sweeps: (vec![0, 2], 1), detections: (vec![0, 1, 2], 0), clusters: (vec![0, 2], 1) };
+        let all = || (vec![0, 1, 2], 0);
+        let expected = Outcome { sweeps: (vec![0, 2], 1), detections: all(), clusters: (vec![0, 2], 1), tracks: all() };
         assert_eq!(outcome, expected, "sector {missing}");
     }
 }
@@ -86,7 +91,10 @@ fn detections_that_lack_a_sector_are_lost_and_their_sweep_is_not() {
                 detections(tape, &made, if number == 2 { &rest } else { &ALL });
             }
         });
-        let expected = Outcome { sweeps: (vec![0, 1, 2], 0), detections: (vec![0, 1], 1), clusters: (vec![0, 1], 1) };
+        let (all, but_one) = (|| (vec![0, 1, 2], 0), || (vec![0, 1], 1));
+        // Tracks are whole with the last sector; that a sweep began is seen by its first.
+        let tracks = if missing == 1 { all() } else { but_one() };
+        let expected = Outcome { sweeps: all(), detections: but_one(), clusters: but_one(), tracks };
         assert_eq!(outcome, expected, "sector {missing}");
     }
 }
@@ -103,7 +111,7 @@ fn detections_may_come_sweeps_later_or_before_the_last_sector_of_their_sweep() {
         sweep(tape, &made(5), &ALL);
     });
     let all = || ((0..6).collect::<Vec<u32>>(), 0);
-    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all() });
+    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all(), tracks: all() });
 }
 
 #[test]
@@ -112,7 +120,8 @@ fn detections_that_never_come_are_given_up_with_later_ones_and_at_the_end() {
         (0..6).for_each(|number| sweep(tape, &made(number), &ALL));
         detections(tape, &made(3), &ALL);
     });
-    let expected = Outcome { sweeps: ((0..6).collect(), 0), detections: (vec![3], 5), clusters: (vec![3], 5) };
+    let one = || (vec![3], 5);
+    let expected = Outcome { sweeps: ((0..6).collect(), 0), detections: one(), clusters: one(), tracks: one() };
     assert_eq!(outcome, expected);
     assert_eq!(counts.failure, None);
 }
@@ -124,7 +133,7 @@ fn no_more_sweeps_than_configured_wait_for_their_detections() {
         (0..5).for_each(|number| detections(tape, &made(number), &ALL));
     });
     let all = || ((0..5).collect::<Vec<u32>>(), 0);
-    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: (vec![3, 4], 3) });
+    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: (vec![3, 4], 3), tracks: all() });
 }
 
 #[test]
@@ -138,7 +147,7 @@ fn a_sweep_that_is_sent_again_from_its_first_sector_is_written_once() {
         detections(tape, &made(1), &ALL);
     });
     let all = || (vec![0, 1], 0);
-    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all() });
+    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all(), tracks: all() });
     assert_eq!(counts.doubles, 6);
 }
 
@@ -151,7 +160,7 @@ fn a_successor_takes_sweeps_that_are_sent_again_though_the_rest_of_later_ones_ca
         (0..3).for_each(|number| detections(tape, &made(number), &ALL));
     });
     let all = || (vec![0, 1, 2], 0);
-    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all() });
+    assert_eq!(outcome, Outcome { sweeps: all(), detections: all(), clusters: all(), tracks: all() });
     assert_eq!(counts.doubles, 0);
 }
 
@@ -164,7 +173,8 @@ fn detections_whose_members_are_no_returns_of_the_sweep_cost_the_clusters_alone(
         detections(tape, &odd, &ALL);
         give(tape, &made(1), SECTORS);
     });
-    let expected = Outcome { sweeps: (vec![0, 1], 0), detections: (vec![0, 1], 0), clusters: (vec![1], 1) };
+    let both = || (vec![0, 1], 0);
+    let expected = Outcome { sweeps: both(), detections: both(), clusters: (vec![1], 1), tracks: both() };
     assert_eq!(outcome, expected);
 }
 
@@ -181,7 +191,7 @@ fn a_sweep_is_done_when_all_of_it_is_in_the_systems_hands() {
     tape.checkpoint(UTC_NS);
     assert_eq!(tape.done_sweeps(), 1);
     let torn = std::fs::read(&path).unwrap();
-    assert_eq!(common::read_bytes(&torn).0.len(), 5);
+    assert_eq!(common::read_bytes(&torn).0.len(), 7);
     sweep(&mut tape, &made(2), &ALL);
     detections(&mut tape, &made(2), &[0]);
     tape.checkpoint(UTC_NS);
@@ -193,10 +203,32 @@ fn a_sweep_is_done_when_all_of_it_is_in_the_systems_hands() {
 #[test]
 fn what_is_done_depends_on_what_is_written_of_a_sweep() {
     let folder = tempfile::tempdir().unwrap();
-    for (topics, done) in [(&[Topic::RawSweep][..], 1), (&[Topic::Detections], 0), (&[Topic::Clusters], 0)] {
+    for (topics, done) in
+        [(&[Topic::RawSweep][..], 1), (&[Topic::Detections], 0), (&[Topic::Clusters], 0), (&[Topic::Tracks], 0)]
+    {
         let mut tape = start(settings(topics), &folder.path().join("run.mcap"), SECTORS);
         sweep(&mut tape, &made(0), &ALL);
         tape.checkpoint(UTC_NS);
         assert_eq!(tape.done_sweeps(), done, "{topics:?}");
     }
+}
+
+#[test]
+fn a_sweep_without_a_table_is_written_so_and_is_no_loss() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut tape = start(settings(&[Topic::Tracks, Topic::RawTracks]), &path, SECTORS);
+    let mut unanswered = made(0);
+    unanswered.tracks.clear();
+    detections(&mut tape, &unanswered, &ALL);
+    tape.checkpoint(UTC_NS);
+    assert_eq!(tape.done_sweeps(), 1);
+    tape.finish(UTC_NS).unwrap();
+    let read = read(&path);
+    let raw = common::of(&read, Topic::RawTracks);
+    let (trace, rest) = Trace::read_raw(&raw[0].data).unwrap();
+    assert_eq!((trace, rest), (unanswered.trace(2, SECTORS), &common::bytes(&*unanswered.tracks)[..]));
+    // To people nothing is said: what they saw before stays until it is no longer valid.
+    assert!(common::of(&read, Topic::Tracks)[0].data.is_empty());
+    assert_eq!(tape.counts().lost(), 0);
 }

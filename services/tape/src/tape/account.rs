@@ -19,10 +19,8 @@ impl Tape {
         let sweeps = has(&[Topic::RawSweep, Topic::Sweep, Topic::Clusters]).then_some(self.sweeps.next());
         let detections =
             has(&[Topic::RawDetections, Topic::Detections, Topic::Clusters]).then_some(self.detections.next());
-        match (sweeps, detections) {
-            (Some(one), Some(other)) => one.min(other),
-            (one, other) => one.or(other).unwrap_or(u64::MAX),
-        }
+        let tracks = has(&[Topic::RawTracks, Topic::Tracks]).then_some(self.tracks.next());
+        [sweeps, detections, tracks].into_iter().flatten().min().unwrap_or(u64::MAX)
     }
 
     /// What is in the files and what is lost, as of the latest commit; what is in an open chunk is in neither.
@@ -34,6 +32,7 @@ impl Tape {
                 Topic::Sweep | Topic::RawSweep => self.sweeps.lost(),
                 Topic::Detections | Topic::RawDetections => self.detections.lost(),
                 Topic::Clusters => (paired_below - self.first_sweep).saturating_sub(self.pairs.paired),
+                Topic::Tracks | Topic::RawTracks => self.tracks.lost(),
                 Topic::Truth => self.truths.lost(),
                 Topic::RawClusters => self.raw_clusters.lost(),
                 Topic::RawDescriptors => self.raw_descriptors.lost(),
@@ -46,6 +45,7 @@ impl Tape {
                 lost: reels.lost[topic as usize] + never_came,
             }
         };
+        // Tracks come in the parts of the detections.
         let streams = [&self.sweeps, &self.detections, &self.truths, &self.raw_clusters, &self.raw_descriptors];
         Counts {
             topics: reels.settings().topics().iter().map(count).collect(),

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use lidar::{Column, ObstacleClass, Return, Ring};
 use messages::{
-    ClusterSummary, Cutter, Detection, Detections, Message, Part, Raw, Solid, Sweep, Trace, Truth, TruthObject,
+    ClosestApproach, ClusterSummary, Cutter, Detection, Detections, Message, Part, Raw, Solid, Sweep, Trace, Track,
+    TrackState, TrackTable, Truth, TruthObject,
 };
 use tape::{About, Settings, Tape, TapeFile, Topic};
 use zerocopy::FromZeros;
@@ -26,6 +27,7 @@ pub struct Made {
     pub number: u64,
     pub sweep: Box<Sweep>,
     pub detections: Box<Detections>,
+    pub tracks: Box<TrackTable>,
     pub truth: Box<Truth>,
 }
 
@@ -58,10 +60,11 @@ pub fn made(number: u64) -> Made {
     sweep.header.refused[0] = COLUMNS / CLUSTER_COLUMNS;
     Cutter::new(1).measure(&mut sweep);
     let detections = detections(&sweep);
+    let tracks = tracks(&detections);
     let mut truth = Truth::new_box_zeroed().unwrap();
     truth.sensor_time_ns = sweep.header.sensor_time_ns;
     truth.objects.push(TruthObject { id: 1, centre_m: [number as f32, 0.0, 0.0], ..TruthObject::default() }).unwrap();
-    Made { number, sweep, detections, truth }
+    Made { number, sweep, detections, tracks, truth }
 }
 
 fn detections(sweep: &Sweep) -> Box<Detections> {
@@ -92,6 +95,38 @@ fn detections(sweep: &Sweep) -> Box<Detections> {
         }
     }
     whole
+}
+
+/// One of each state at the end of the sweep, the first on alert; all but the coasting one were seen.
+fn tracks(detections: &Detections) -> Box<TrackTable> {
+    let mut table = TrackTable::new_box_zeroed().unwrap();
+    table.time_ns = detections.header.sensor_time_ns + PERIOD_NS;
+    let valid_until_ns = table.time_ns + 3 * PERIOD_NS;
+    let states = [TrackState::Confirmed, TrackState::Tentative, TrackState::Coasting];
+    for (place, (state, detection)) in states.into_iter().zip(&detections.detections).enumerate() {
+        let (first_key, keys) = (table.keys.len() as u32, u32::from(state != TrackState::Coasting));
+        if keys > 0 {
+            table.keys.push(detection.summary.key).unwrap();
+        }
+        let track = Track {
+            id: 1_025 + place as u64,
+            valid_until_ns,
+            position_m: detection.summary.centroid_m,
+            velocity_mps: [0.5, 0.0, -0.25],
+            size_m: [1.0, 2.0, 3.0],
+            attitude_wxyz: [1.0, 0.0, 0.0, 0.0],
+            posterior: detection.posterior,
+            approach: ClosestApproach { collision_probability: 0.5, ..ClosestApproach::default() },
+            first_key,
+            keys,
+            state,
+            class: detection.class,
+            alert: u8::from(place == 0),
+            ..Track::default()
+        };
+        table.tracks.push(track).unwrap();
+    }
+    table
 }
 
 impl Made {
@@ -132,6 +167,15 @@ impl Made {
             (trace, piece)
         };
         self.sweep_parts(sectors).into_iter().enumerate().map(part).collect()
+    }
+
+    /// The tracks that come with a part: all with the last, none before.
+    pub fn tracks_with(&self, trace: &Trace) -> Box<TrackTable> {
+        let mut table = empty::<TrackTable>();
+        if trace.part.is_last() {
+            table.read_raw(&bytes(&*self.tracks)).unwrap();
+        }
+        table
     }
 }
 
@@ -176,6 +220,7 @@ pub fn give(tape: &mut Tape, made: &Made, sectors: u32) {
     if sectors == 1 {
         tape.sweep(utc_ns, &made.trace(0, 1), &made.sweep);
         tape.detections(utc_ns, &made.trace(0, 1), &made.detections);
+        tape.tracks(utc_ns, &made.trace(0, 1), &made.tracks);
         return;
     }
     for (trace, piece) in made.sweep_parts(sectors) {
@@ -183,6 +228,7 @@ pub fn give(tape: &mut Tape, made: &Made, sectors: u32) {
     }
     for (trace, piece) in made.detection_parts(sectors) {
         tape.detections(utc_ns, &trace, &piece);
+        tape.tracks(utc_ns, &trace, &made.tracks_with(&trace));
     }
 }
 
