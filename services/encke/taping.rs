@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use events::{Reader, Severity};
-use messages::{Clusters, Descriptors, Detections, Sweep, Trace, Truth};
+use messages::{Clusters, Descriptors, Sweep, Trace, Tracks, Truth};
 use runtime::{Pace, Plan, Shell};
 use stage::{SinkError, Tap};
 use tape::{About, Counts, Event, Level, Tape, TapeFile, Topic};
@@ -127,8 +127,9 @@ impl Tap for Taping {
         self.tape.sweep(utc_ns, trace, part);
     }
 
-    fn detections(&mut self, trace: &Trace, part: &Detections, utc_ns: u64) {
-        self.tape.detections(utc_ns, trace, part);
+    fn tracks(&mut self, trace: &Trace, part: &Tracks, utc_ns: u64) {
+        self.tape.detections(utc_ns, trace, &part.detections);
+        self.tape.tracks(utc_ns, trace, &part.table);
     }
 
     fn wants_between(&self) -> (bool, bool) {
