@@ -32,6 +32,7 @@ mod run_report;
 mod sets;
 mod solids;
 mod svm_text;
+mod tracks;
 mod train;
 
 pub use bars::{
