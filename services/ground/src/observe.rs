@@ -231,11 +231,19 @@ impl Observer {
     /// # Errors
     /// A field that finds no room for its obstacles.
     pub fn show(&mut self, seed: Option<u64>, sweep: u64) -> Result<(), ObserveError> {
-        let scene = SceneFile { seed: seed.unwrap_or(self.scene.seed), ..self.scene.clone() };
-        let mut simulator = Simulator::new(checked(scene, &self.sensor, "scene")?);
+        let mut simulator = self.simulator(seed.unwrap_or(self.scene.seed))?;
         simulator.sweep(sweep, &mut self.sweep, &mut self.truth);
         self.describe();
         Ok(())
+    }
+
+    /// The scene with this seed, to be looked at sweep by sweep.
+    ///
+    /// # Errors
+    /// A field that finds no room for its obstacles.
+    pub fn simulator(&self, seed: u64) -> Result<Simulator, ObserveError> {
+        let scene = SceneFile { seed, ..self.scene.clone() };
+        Ok(Simulator::new(checked(scene, &self.sensor, "scene")?))
     }
 
     /// Whatever `fill` puts into an empty sweep and its truth, as the chain describes it.

@@ -1,5 +1,6 @@
 //! The bars: adding one is adding an entry to [`BARS`], and its target to the plans.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use super::Evaluation;
@@ -86,30 +87,31 @@ impl Bar {
     }
 }
 
-/// How a bar is measured.
-pub(crate) struct Definition {
+/// How a bar is measured on an evaluation `E`.
+pub(crate) struct Definition<E> {
     pub(crate) key: &'static str,
     says: &'static str,
     unit: &'static str,
     sense: Sense,
-    measure: fn(&Evaluation) -> Measure,
+    measure: fn(&E) -> Measure,
 }
 
-impl Definition {
-    pub(crate) fn bar(&self, evaluation: &Evaluation) -> Bar {
+impl<E> Definition<E> {
+    /// What was measured, against these targets.
+    pub(crate) fn bar(&self, evaluation: &E, targets: &BTreeMap<String, f64>) -> Bar {
         Bar {
             key: self.key,
             says: self.says,
             unit: self.unit,
             sense: self.sense,
-            target: evaluation.plan.bars.get(self.key).copied(),
+            target: targets.get(self.key).copied(),
             measured: (self.measure)(evaluation),
         }
     }
 }
 
 /// Every bar, in the order of reports.
-pub(crate) const BARS: [Definition; 16] = [
+pub(crate) const BARS: [Definition<Evaluation>; 16] = [
     at_least("clusters", "clusters of at least 5 points that all is measured on", "", |e| Measure {
         value: Some(e.reference.all.of.into()),
         error: None,
@@ -157,29 +159,29 @@ pub(crate) const BARS: [Definition; 16] = [
     }),
 ];
 
-const fn at_least(
+pub(crate) const fn at_least<E>(
     key: &'static str,
     says: &'static str,
     unit: &'static str,
-    measure: fn(&Evaluation) -> Measure,
-) -> Definition {
+    measure: fn(&E) -> Measure,
+) -> Definition<E> {
     Definition { key, says, unit, sense: Sense::AtLeast, measure }
 }
 
-const fn at_most(
+pub(crate) const fn at_most<E>(
     key: &'static str,
     says: &'static str,
     unit: &'static str,
-    measure: fn(&Evaluation) -> Measure,
-) -> Definition {
+    measure: fn(&E) -> Measure,
+) -> Definition<E> {
     Definition { key, says, unit, sense: Sense::AtMost, measure }
 }
 
-fn share(share: Share) -> Measure {
+pub(crate) fn share(share: Share) -> Measure {
     Measure { value: share.per_cent(), error: share.standard_error_per_cent(), of: share.of }
 }
 
-fn number(value: Option<f64>, of: u32) -> Measure {
+pub(crate) fn number(value: Option<f64>, of: u32) -> Measure {
     Measure { value, error: None, of }
 }
 

@@ -45,7 +45,7 @@ impl Evaluation {
     }
 }
 
-fn bar(bar: &Bar) -> Value {
+pub(crate) fn bar(bar: &Bar) -> Value {
     json!({
         "key": bar.key,
         "says": bar.says,
@@ -63,7 +63,7 @@ fn bar(bar: &Bar) -> Value {
     })
 }
 
-fn share(share: Share) -> Value {
+pub(crate) fn share(share: Share) -> Value {
     json!({ "count": share.count, "of": share.of, "per_cent": share.per_cent().map(rounded) })
 }
 
@@ -99,7 +99,7 @@ fn tally(tally: &Tally) -> Value {
     })
 }
 
-fn reliability(table: &Reliability) -> Value {
+pub(crate) fn reliability(table: &Reliability) -> Value {
     let bins = table.bins.iter().filter(|bin| bin.count > 0).map(
         |bin| json!({ "count": bin.count, "confidence": rounded(bin.confidence), "accuracy": rounded(bin.accuracy) }),
     );
@@ -154,6 +154,6 @@ fn claims(claims: &Claims, note: &EvaluationNote) -> Value {
 }
 
 /// To four places.
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

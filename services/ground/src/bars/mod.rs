@@ -1,19 +1,19 @@
 //! The configured classifier against declared bars, from one plan.
 
-mod bar;
+pub(crate) mod bar;
 mod budget;
-mod charts;
+pub(crate) mod charts;
 mod claims;
 mod fit_time;
-mod json;
+pub(crate) mod json;
 mod judged;
-mod page;
+pub(crate) mod page;
 mod page_plots;
 mod plan;
 mod share;
 mod solid_error;
 mod summed;
-mod table;
+pub(crate) mod table;
 mod tally;
 #[cfg(test)]
 mod tests;
@@ -29,8 +29,10 @@ pub use fit_time::{Clock, FitTime};
 pub use json::EvaluationNote;
 pub use plan::{BudgetPlan, EvaluationPlan, EvaluationPlanError, FitPlan, SweepsPlan, VariantsPlan};
 pub use share::Share;
+pub(crate) use share::quantile;
 pub use summed::Summed;
 pub use tally::{SolidErrors, Tally, Threshold};
+pub(crate) use witness::Witness;
 pub use witness::{Judge, Judges};
 
 use crate::{Files, ObserveError, Progress, View};
@@ -74,6 +76,17 @@ pub enum EvaluateError {
     /// The classifier would not take what the extractor gave.
     #[error("classifier: {}, must take what the extractor gives", .0.name())]
     Rejected(Verdict),
+    /// The tracker would not take what the classifier gave, or gave no tracks at a sweep's end.
+    #[error("tracker: {}, must take what the classifier gives, with tracks at each sweep's end", .0.name())]
+    Tracker(Verdict),
+    /// The tracker does not look as far ahead as encounters are judged.
+    #[error("encounters.lead_s is {lead_s}, must be at most the tracker's horizon, {horizon_s}")]
+    Horizon {
+        /// The plan's.
+        lead_s: f64,
+        /// The tracker's.
+        horizon_s: f64,
+    },
     /// The recording cannot be read on.
     #[error("{0}")]
     Recording(String),
@@ -133,7 +146,7 @@ impl Evaluation {
 
     /// Every bar, judged or not.
     pub fn bars(&self) -> Vec<Bar> {
-        bar::BARS.iter().map(|definition| definition.bar(self)).collect()
+        bar::BARS.iter().map(|definition| definition.bar(self, &self.plan.bars)).collect()
     }
 
     /// Keys of the bars that fall short.

@@ -10,7 +10,7 @@ use super::{Bar, Claims, Evaluation, EvaluationNote, Share, SolidErrors, Standin
 use crate::page::{document, escaped};
 
 /// Beyond what the paper's page has: a bar that falls short is marked by more than its colour.
-const MORE_STYLE: &str = "td.short{background:#f7d9d6;font-weight:700}td.ok{background:#dfeedd}.side figure{margin:6px 0 14px;max-width:510px}";
+pub(crate) const MORE_STYLE: &str = "td.short{background:#f7d9d6;font-weight:700}td.ok{background:#dfeedd}.side figure{margin:6px 0 14px;max-width:510px}";
 
 impl Evaluation {
     /// `evaluate.html`: bars, tables and plots.
@@ -23,7 +23,7 @@ impl Evaluation {
 
     fn write_page(&self, page: &mut String, note: &EvaluationNote) -> fmt::Result {
         self.write_head(page, note)?;
-        self.write_bars(page)?;
+        write_bars(page, &self.bars())?;
         write_matrix(page, &self.reference)?;
         write_plots(self, page)?;
         self.write_variants(page)?;
@@ -64,33 +64,6 @@ impl Evaluation {
             note.run.cores,
             escaped(&note.run.machine),
         )
-    }
-
-    fn write_bars(&self, page: &mut String) -> fmt::Result {
-        page.push_str(
-            "<h2>Bars</h2><div class=\"wide\"><table><tr><th>What</th><th>Key</th><th class=\"n\">Target</th>\
-             <th class=\"n\">Measured</th><th class=\"n\">Of</th><th>Stands</th></tr>",
-        );
-        for bar in self.bars() {
-            let style = match bar.standing() {
-                Standing::Holds => "ok",
-                Standing::FallsShort => "short",
-                Standing::NotJudged => "",
-            };
-            write!(
-                page,
-                "<tr><td>{}</td><td><code>{}</code></td><td class=\"n\">{}</td><td class=\"n\"><b class=\"k\">{}</b></td>\
-                 <td class=\"n\">{}</td><td class=\"{style}\">{}</td></tr>",
-                bar.says,
-                bar.key,
-                target(&bar),
-                value(&bar),
-                bar.measured.of,
-                bar.standing(),
-            )?;
-        }
-        page.push_str("</table></div>");
-        Ok(())
     }
 
     fn write_variants(&self, page: &mut String) -> fmt::Result {
@@ -150,6 +123,34 @@ impl Evaluation {
         page.push_str("</table></div>");
         Ok(())
     }
+}
+
+/// The bars as a table with a heading.
+pub(crate) fn write_bars(page: &mut String, bars: &[Bar]) -> fmt::Result {
+    page.push_str(
+        "<h2>Bars</h2><div class=\"wide\"><table><tr><th>What</th><th>Key</th><th class=\"n\">Target</th>\
+         <th class=\"n\">Measured</th><th class=\"n\">Of</th><th>Stands</th></tr>",
+    );
+    for bar in bars {
+        let style = match bar.standing() {
+            Standing::Holds => "ok",
+            Standing::FallsShort => "short",
+            Standing::NotJudged => "",
+        };
+        write!(
+            page,
+            "<tr><td>{}</td><td><code>{}</code></td><td class=\"n\">{}</td><td class=\"n\"><b class=\"k\">{}</b></td>\
+             <td class=\"n\">{}</td><td class=\"{style}\">{}</td></tr>",
+            bar.says,
+            bar.key,
+            target(bar),
+            value(bar),
+            bar.measured.of,
+            bar.standing(),
+        )?;
+    }
+    page.push_str("</table></div>");
+    Ok(())
 }
 
 fn target(bar: &Bar) -> String {

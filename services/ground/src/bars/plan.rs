@@ -94,6 +94,18 @@ pub enum EvaluationPlanError {
         /// Most that it may be.
         most: u64,
     },
+    /// A number is out of its range.
+    #[error("{key} is {value}, must be {least} to {most}")]
+    Number {
+        /// The key, with its table.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least that it may be.
+        least: f64,
+        /// Most that it may be.
+        most: f64,
+    },
     /// Targets name a bar that is none.
     #[error("bars.{key} is no bar, must be one of {known}")]
     Unknown {

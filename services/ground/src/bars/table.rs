@@ -67,7 +67,8 @@ impl fmt::Display for Evaluation {
     }
 }
 
-fn write_bars(f: &mut fmt::Formatter<'_>, bars: &[Bar]) -> fmt::Result {
+/// The bars as rows.
+pub(crate) fn write_bars(f: &mut fmt::Formatter<'_>, bars: &[Bar]) -> fmt::Result {
     writeln!(f, "{:<28}{:>11}{:>20}{:>7}", "bar", "target", "measured", "of")?;
     for bar in bars {
         let target = bar.target.map_or("-".to_owned(), |target| format!("{} {target}", bar.sense.sign()));

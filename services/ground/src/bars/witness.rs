@@ -46,6 +46,11 @@ impl Witness {
 }
 
 impl Bench {
+    /// What it said last.
+    pub(crate) fn detections(&self) -> &Detections {
+        &self.detections
+    }
+
     /// What the classifier says of a sweep.
     pub(crate) fn detect(&mut self, descriptors: &Descriptors) -> Result<&Detections, EvaluateError> {
         self.detections.clear();

@@ -11,7 +11,8 @@ use super::pictures::{Scan, Scene};
 pub(crate) const COLOURS: [&str; 5] = ["#c8322b", "#2359a8", "#b0189a", "#2f7d32", "#8a8a8a"];
 
 /// Colours that tell neighbouring clusters apart.
-const APART: [&str; 8] = ["#1b6ca8", "#d1495b", "#2e933c", "#8f4fb8", "#c77700", "#00848a", "#6b4a2b", "#c2185b"];
+pub(crate) const APART: [&str; 8] =
+    ["#1b6ca8", "#d1495b", "#2e933c", "#8f4fb8", "#c77700", "#00848a", "#6b4a2b", "#c2185b"];
 
 /// The colour of a class.
 pub(crate) fn colour(class: ObstacleClass) -> &'static str {
@@ -193,13 +194,13 @@ impl View {
     }
 }
 
-fn open(width: f64, height: f64, label: &str) -> String {
+pub(crate) fn open(width: f64, height: f64, label: &str) -> String {
     format!(
         r##"<svg viewBox="0 0 {width} {height}" width="{width}" role="img" aria-label="{label}" font-family="sans-serif" fill="#222">"##
     )
 }
 
-fn shape(svg: &mut String, kind: &str, points: &[[f64; 2]], style: &str) {
+pub(crate) fn shape(svg: &mut String, kind: &str, points: &[[f64; 2]], style: &str) {
     let _ = write!(svg, r#"<{kind} {style} points=""#);
     for [x, y] in points {
         let _ = write!(svg, "{x:.1},{y:.1} ");
@@ -207,10 +208,10 @@ fn shape(svg: &mut String, kind: &str, points: &[[f64; 2]], style: &str) {
     svg.push_str(r#""/>"#);
 }
 
-fn dot(svg: &mut String, [x, y]: [f64; 2], radius: f64) {
+pub(crate) fn dot(svg: &mut String, [x, y]: [f64; 2], radius: f64) {
     let _ = write!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}"/>"#);
 }
 
-fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, size: u32, words: &str) {
+pub(crate) fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, size: u32, words: &str) {
     let _ = write!(svg, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-size="{size}">{words}</text>"#);
 }
