@@ -129,8 +129,9 @@ mod tests {
                     }
                 }
                 let found = surface_distance_m(&body, point);
-                // A grid of 2.5 cm has a point within half its diagonal of the nearest, and a little more at edges.
-                assert!(found <= least + 1e-9 && least < found + 0.06, "{shape:?} {point}: {found} is not {least}");
+                // A grid of 2.5 cm has a point within half its diagonal of the nearest, and a little more at edges and a cone's tip.
+                let room_m = if shape == Shape::Cone { 0.12 } else { 0.06 };
+                assert!(found <= least + 1e-9 && least < found + room_m, "{shape:?} {point}: {found} is not {least}");
                 assert_eq!(found == 0.0, is_inside(shape, half, point), "{shape:?} {point}");
             }
         }
