@@ -77,10 +77,7 @@ pub struct Encounters {
 impl Encounters {
     /// Runs every scene of the plan until its obstacles are judged, on all cores.
     pub(crate) fn measure(plan: &TracksPlan, danger: Danger, rooms: Rooms<'_>) -> Result<Self, EvaluateError> {
-        let EncountersPlan { count, together, lead_s, .. } = plan.encounters;
-        if count > 0 && danger.horizon_s < lead_s {
-            return Err(EvaluateError::Horizon { lead_s, horizon_s: danger.horizon_s });
-        }
+        let EncountersPlan { count, together, .. } = plan.encounters;
         let view = View::of(&plan.scene);
         let scenes = count.div_ceil(together);
         let jobs: Vec<u32> = (0..scenes).step_by(SCENES_A_JOB as usize).collect();

@@ -89,6 +89,10 @@ impl TrackEvaluation {
         progress: &mut dyn FnMut(&Progress),
     ) -> Result<Self, EvaluateError> {
         plan.check()?;
+        let (lead_s, horizon_s) = (plan.encounters.lead_s, danger.horizon_s);
+        if plan.encounters.count > 0 && horizon_s < lead_s {
+            return Err(EvaluateError::Horizon { lead_s, horizon_s });
+        }
         let (rooms, view) = (Rooms { read, judges, followers }, View::of(&plan.scene));
         // What cannot be seen is known before any work.
         let period_s = Observer::new(&view, &read)?.simulator(plan.scene_seed(0))?.period_ns() as f64 * 1e-9;
