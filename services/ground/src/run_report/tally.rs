@@ -6,10 +6,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use messages::{Detections, Trace};
+use messages::{Detections, Message, Trace, Tracks};
 use recorder::{LatencyPoints, Recorder, Settings, Snapshot, SweepTimeline};
 use serde_json::{Value, json};
 use stage::Sink;
+use zerocopy::FromZeros;
 
 use super::RunFigures;
 
@@ -22,6 +23,8 @@ const NEVER_MS: f64 = 3_600_000.0;
 /// Sweeps so far.
 pub(crate) struct Tally {
     recorder: Recorder,
+    /// What the recorder is given: detections, and no tracks.
+    message: Box<Tracks>,
     paced: bool,
     deadline_ms: Option<f64>,
     sectors: u64,
@@ -36,6 +39,7 @@ impl Tally {
         let deadline_ms = deadline_ms.filter(|ms| *ms > 0.0 && *ms <= NEVER_MS);
         let settings = Settings {
             detections: None,
+            tracks: None,
             labels: None,
             trace: None,
             statistics: None,
@@ -49,7 +53,8 @@ impl Tally {
             stages: STAGES.map(str::to_owned).to_vec(),
         };
         let recorder = Recorder::start(settings, Arc::new(|_| ())).ok()?;
-        Some(Self { recorder, paced, deadline_ms, sectors, hops: 0, host_ns: None })
+        let message = Tracks::new_box_zeroed().ok()?;
+        Some(Self { recorder, message, paced, deadline_ms, sectors, hops: 0, host_ns: None })
     }
 
     /// Adds a sweep by the trace of its last part.
@@ -61,7 +66,9 @@ impl Tally {
         self.host_ns = Some((begin_ns.min(trace.sweep_start_ns), latest_ns.max(end_ns)));
         let part = &mut trace.part;
         (part.ordinal, part.sector, part.sectors) = (part.sweep, 0, 1);
-        self.recorder.accept(&trace, detections);
+        self.message.clear();
+        self.message.detections.copy_from(detections);
+        self.recorder.accept(&trace, &self.message);
     }
 
     /// Begin and end of the recorded sweeps in host time [ns].
