@@ -13,7 +13,7 @@ pub struct Account {
     pub topics: Vec<TopicAccount>,
     /// Parts of sweeps that passed unseen: this process was too slow.
     pub unseen_sweep_parts: u64,
-    /// Parts of detections that passed unseen.
+    /// Parts of detections that passed unseen, and with them tracks.
     pub unseen_detection_parts: u64,
 }
 
@@ -26,7 +26,7 @@ pub struct TopicAccount {
     pub sent: u64,
     /// Not encoded: the client had not taken the one before yet.
     pub behind: u64,
-    /// Not encoded: not all of the sweep was seen, or the client came in the middle of it.
+    /// Not encoded: not all of the sweep was seen, the client came in the middle of it, or there was no table of tracks.
     pub incomplete: u64,
     /// Encoded, and the client left before it had it.
     pub undelivered: u64,

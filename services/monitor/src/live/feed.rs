@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use lidar::Return;
-use messages::{Detections, Joiner, Message, Sweep, Trace};
-use tape::{Clouds, Clustered, DetectionsJoiner, Scenes, Topic};
+use messages::{Detections, Joiner, Message, Sweep, Trace, TrackTable, Tracks};
+use tape::{Clouds, Clustered, DetectionsJoiner, Scenes, Topic, TrackScenes};
 use transport::{Tap, TransportError};
 
 use super::server::Server;
@@ -17,11 +17,12 @@ const HELD: usize = 3;
 /// What the chain says, for clients.
 pub(super) struct Feed {
     sweeps: Ears<Sweep>,
-    detections: Ears<Detections>,
+    tracks: Ears<Tracks>,
     joiner: Joiner,
     detections_joiner: DetectionsJoiner,
     clouds: Clouds,
     scenes: Scenes,
+    track_scenes: TrackScenes,
     held: VecDeque<Held>,
     /// Sensor time of the latest part [ns].
     pub(super) sensor_time_ns: u64,
@@ -68,11 +69,12 @@ impl Feed {
     pub(super) fn of(chain: &Attached) -> Result<Self, MonitorError> {
         Ok(Self {
             sweeps: Ears::new(chain.node.tap()?),
-            detections: Ears::new(chain.node.tap()?),
+            tracks: Ears::new(chain.node.tap()?),
             joiner: Joiner::new().ok_or(MonitorError::Memory)?,
             detections_joiner: DetectionsJoiner::new().ok_or(MonitorError::Memory)?,
             clouds: Clouds::default(),
             scenes: Scenes::default(),
+            track_scenes: TrackScenes::default(),
             held: VecDeque::new(),
             sensor_time_ns: 0,
         })
@@ -80,7 +82,7 @@ impl Feed {
 
     /// Parts that passed unseen: of sweeps, of detections.
     pub(super) fn unseen(&self) -> (u64, u64) {
-        (self.sweeps.unseen, self.detections.unseen)
+        (self.sweeps.unseen, self.tracks.unseen)
     }
 
     /// Takes all there is and offers what it makes.
@@ -89,8 +91,10 @@ impl Feed {
             self.sensor_time_ns = taken.trace().part.sensor_time_ns;
             self.sweep(taken.trace(), taken.message(), server);
         }
-        while let Some(taken) = self.detections.take()? {
-            self.detections(taken.trace(), taken.message(), server);
+        while let Some(taken) = self.tracks.take()? {
+            let Tracks { detections, table } = taken.message();
+            self.detections(taken.trace(), detections, server);
+            self.tracks(taken.trace(), table, server);
         }
         Ok(())
     }
@@ -155,6 +159,22 @@ impl Feed {
                 members: &whole.members,
             };
             clouds.clusters(&clustered, out)
+        });
+    }
+    /// Tracks are whole with the last part of their sweep.
+    fn tracks(&mut self, trace: &Trace, table: &TrackTable, server: &mut Server) {
+        let part = &trace.part;
+        if !part.is_last() {
+            return;
+        }
+        if table.time_ns == 0 {
+            server.skip(Topic::Tracks);
+            return;
+        }
+        let scenes = &mut self.track_scenes;
+        server.offer(Topic::Tracks, part.sensor_time_ns, |out| {
+            scenes.tracks(table, out);
+            true
         });
     }
 }

@@ -10,7 +10,8 @@ use tape::Topic;
 pub(super) const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
 /// The topics that are served, by the number of their channel.
-pub(super) const TOPICS: [Topic; 5] = [Topic::Sweep, Topic::Clusters, Topic::Detections, Topic::Events, Topic::Status];
+pub(super) const TOPICS: [Topic; 6] =
+    [Topic::Sweep, Topic::Clusters, Topic::Detections, Topic::Events, Topic::Status, Topic::Tracks];
 
 /// A topic's place in [`TOPICS`].
 pub(super) fn place(topic: Topic) -> usize {
@@ -151,7 +152,7 @@ mod tests {
         assert_eq!(unsubscribe, Some(FromClient::Unsubscribe { subscription_ids: vec![9] }));
         assert_eq!(parse(r#"{"op":"getParameters","parameterNames":[]}"#), Some(FromClient::Other));
         assert_eq!(parse("nothing"), None);
-        for channel_id in [0, 6, u32::MAX] {
+        for channel_id in [0, 7, u32::MAX] {
             assert_eq!(Subscription { id: 1, channel_id }.place(), None);
         }
     }

@@ -1,5 +1,6 @@
 //! `encke metrics`: a running chain's counters for Prometheus, over HTTP.
 
+mod ears;
 mod http;
 mod look;
 mod text;
@@ -13,6 +14,7 @@ use transport::Instance;
 
 use crate::MonitorError;
 use crate::process::be_nice;
+use ears::Ears;
 use http::Server;
 use look::{Look, Told};
 
@@ -27,7 +29,7 @@ pub struct Settings {
 const IDLE_NS: u64 = 200_000_000;
 
 /// Serves an instance until this process is asked to leave: through all its lives, and while there is none. Each request is
-/// answered from the pages as they are then. `runs` says whether the instance has a supervisor.
+/// answered from the pages as they are then, and from the latest table of tracks. `runs` says whether the instance has a supervisor.
 ///
 /// # Errors
 /// The address cannot be listened on, the instance has no plan, or standard output fails.
@@ -45,11 +47,19 @@ pub fn metrics(instance: &Instance, settings: &Settings, runs: impl Fn() -> bool
         Err(cause) if cause.kind() != io::ErrorKind::BrokenPipe => return Err(MonitorError::Output(cause)),
         _ => {}
     }
-    let mut log = Log::new(instance);
+    let (mut log, mut ears) = (Log::new(instance), Ears::new(instance));
+    let look = || if runs() { Look::take(instance) } else { None };
+    // The first answer is to have tracks, too.
+    if let Some(look) = look() {
+        ears.hear(&look);
+    }
     while !shutdown.asked() {
-        server.turn(IDLE_NS, || {
-            let look = if runs() { Look::take(instance) } else { None };
-            text::page(look.as_ref().map(|look| (look, log.read(look))))
+        server.turn(IDLE_NS, || match look() {
+            Some(look) => text::page(Some((&look, log.read(&look), ears.hear(&look)))),
+            None => {
+                ears.leave();
+                text::page(None)
+            }
         });
     }
     Ok(())

@@ -3,20 +3,24 @@
 use std::fmt::{Display, Write};
 
 use chain::Mode;
-use messages::Verdict;
+use messages::{TrackState, Verdict};
 use runtime::page::{Counts, State};
 
+use super::ears::Tracked;
 use super::look::{Look, Told};
 use crate::process::Usage;
 
 /// All that is known; of no chain, that there is none.
-pub(super) fn page(chain: Option<(&Look, &Told)>) -> String {
+pub(super) fn page(chain: Option<(&Look, &Told, Option<&Tracked>)>) -> String {
     let mut page = Page(String::new());
     page.one(Gauge, "encke_up", "Whether the chain's supervisor runs.", u8::from(chain.is_some()));
-    if let Some((look, told)) = chain {
+    if let Some((look, told, tracked)) = chain {
         page.chain(look);
         page.stages(look);
         page.processes(look);
+        if let Some(tracked) = tracked {
+            page.tracks(tracked, look.at_ns);
+        }
         page.events(told);
     }
     page.0
@@ -174,6 +178,24 @@ impl Page {
         }
     }
 
+    fn tracks(&mut self, tracked: &Tracked, at_ns: u64) {
+        self.family(Gauge, "encke_tracks", "Obstacles that are tracked, by state of their track.");
+        for state in [TrackState::Tentative, TrackState::Confirmed, TrackState::Coasting] {
+            self.sample("encke_tracks", &[("state", state.name())], tracked.states[state as usize]);
+        }
+        self.one(Gauge, "encke_tracks_on_alert", "Tracks likelier to be met than allowed.", tracked.alerts);
+        let help = "Largest probability that a track is met within the horizon.";
+        self.one(Gauge, "encke_collision_probability", help, tracked.probability);
+        if let Some((time_s, distance_m)) = tracked.approach {
+            let help = "Until the closest approach of the track that is likeliest met.";
+            self.one(Gauge, "encke_closest_approach_seconds", help, time_s);
+            let help = "Distance of that track's middle then.";
+            self.one(Gauge, "encke_closest_approach_distance_meters", help, distance_m);
+        }
+        let age_s = seconds(at_ns.saturating_sub(tracked.sent_ns));
+        self.one(Gauge, "encke_tracks_age_seconds", "Since these tracks were sent.", age_s);
+    }
+
     fn events(&mut self, told: &Told) {
         let name = "encke_events_total";
         self.family(Counter, name, "Events in the log, by name.");
@@ -187,123 +209,4 @@ impl Page {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::collections::{BTreeMap, BTreeSet};
-
-    use events::EventId;
-
-    use super::*;
-
-    fn look() -> Look {
-        let counts = Counts { incarnation: 2, received: 7, state: State::Running, ..Counts::default() };
-        let full = Counts { incarnation: 1, published: u64::MAX, rejected: [u64::MAX; 11], ..counts };
-        let usage = Some(Usage { cpu_s: 0.25, rss_bytes: 4_096, started_s: 1.0 });
-        Look {
-            instance: "a\"b\\c\nd".to_owned(),
-            source: "scenes/default.toml".to_owned(),
-            pace: "realtime",
-            sectors: 36,
-            deadline_ms: Some(100.0),
-            stages: vec![
-                ("source".to_owned(), full, usage),
-                ("clusterer".to_owned(), counts, None),
-                ("recorder".to_owned(), Counts { answered_ns: 5, latency_ns: 1_500_000, ..counts }, usage),
-            ],
-            tape: Some((counts, usage)),
-            ..Look::default()
-        }
-    }
-
-    fn told() -> Told {
-        Told { events: [(EventId::StageDied, 3), (EventId::PartsDropped, 1)].into(), unsaid: 9 }
-    }
-
-    fn is_name(name: &str) -> bool {
-        name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
-            && name.chars().all(|character| character.is_ascii_alphanumeric() || character == '_')
-    }
-
-    /// Name, labels (as they stand) and value of a sample line.
-    fn parse(line: &str) -> (&str, Vec<(String, String)>, f64) {
-        let (head, value) = line.rsplit_once(' ').unwrap();
-        let Some((name, rest)) = head.split_once('{') else { return (head, Vec::new(), value.parse().unwrap()) };
-        let mut rest = rest.strip_suffix('}').unwrap();
-        let mut labels = Vec::new();
-        while !rest.is_empty() {
-            let (label, quoted) = rest.split_once("=\"").unwrap();
-            let mut text = String::new();
-            let mut characters = quoted.char_indices();
-            let end = loop {
-                match characters.next().unwrap() {
-                    (at, '"') => break at,
-                    (_, '\\') => match characters.next().unwrap().1 {
-                        'n' => text.push('\n'),
-                        other => {
-                            assert!(matches!(other, '"' | '\\'));
-                            text.push(other);
-                        }
-                    },
-                    (_, character) => text.push(character),
-                }
-            };
-            labels.push((label.to_owned(), text));
-            rest = &quoted[end + 1..];
-            rest = rest.strip_prefix(',').unwrap_or(rest);
-        }
-        (name, labels, value.parse().unwrap())
-    }
-
-    #[test]
-    fn the_page_keeps_to_the_formats_grammar() {
-        let text = page(Some((&look(), &told())));
-        assert!(text.ends_with('\n') && !text.contains("\n\n"));
-        let (mut kinds, mut series, mut current) = (BTreeMap::new(), BTreeSet::new(), String::new());
-        for line in text.lines() {
-            if let Some(help) = line.strip_prefix("# HELP ") {
-                let (name, words) = help.split_once(' ').unwrap();
-                assert!(is_name(name) && !words.is_empty() && !words.contains('\\'), "{line}");
-                name.clone_into(&mut current);
-            } else if let Some(kind) = line.strip_prefix("# TYPE ") {
-                let (name, kind) = kind.split_once(' ').unwrap();
-                assert_eq!(name, current, "help and type stand together");
-                assert!(matches!(kind, "counter" | "gauge"));
-                assert!(kinds.insert(name.to_owned(), kind.to_owned()).is_none(), "{name} stands once");
-                assert_eq!(kind == "counter", name.ends_with("_total"), "{name}");
-            } else {
-                let (name, labels, value) = parse(line);
-                assert_eq!(name, current, "all samples of a family stand together, below its type");
-                assert!(labels.iter().all(|(label, _)| is_name(label)), "{line}");
-                assert!(value.is_finite() && value >= 0.0, "{line}");
-                assert!(series.insert((name.to_owned(), labels)), "{line} stands twice");
-            }
-        }
-        assert!(series.len() > 60, "{}", series.len());
-    }
-
-    #[test]
-    fn values_are_in_base_units_and_full_counters_stay_full() {
-        let text = page(Some((&look(), &told())));
-        for line in [
-            "encke_up 1",
-            "encke_sweep_latency_seconds 0.0015",
-            "encke_deadline_seconds 0.1",
-            "encke_parts_published_total{stage=\"source\"} 18446744073709551615",
-            "encke_parts_rejected_total{stage=\"clusterer\",reason=\"stale\"} 0",
-            "encke_stage_restarts_total{stage=\"clusterer\"} 1",
-            "encke_process_resident_memory_bytes{process=\"tape\"} 4096",
-            "encke_events_total{name=\"stage_died\",severity=\"error\"} 3",
-            "encke_events_unsaid_total 9",
-            "encke_mode{mode=\"nominal\"} 1",
-            "encke_mode{mode=\"safe\"} 0",
-        ] {
-            assert!(text.lines().any(|found| found == line), "{line} in\n{text}");
-        }
-        let info = text.lines().find(|line| line.starts_with("encke_info{")).unwrap();
-        assert_eq!(parse(info).1[0], ("instance".to_owned(), "a\"b\\c\nd".to_owned()));
-    }
-
-    #[test]
-    fn of_no_chain_it_is_said_that_there_is_none() {
-        assert_eq!(page(None).lines().last(), Some("encke_up 0"));
-    }
-}
+mod tests;

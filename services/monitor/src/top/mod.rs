@@ -14,7 +14,9 @@ use transport::Instance;
 
 use crate::MonitorError;
 use crate::process::be_nice;
-pub use view::{DetectionRow, DetectionsView, EventView, LatencyView, ProcessView, StageView, TapView, View};
+pub use view::{
+    DetectionRow, DetectionsView, EventView, LatencyView, ProcessView, StageView, TapView, TrackRow, TracksView, View,
+};
 use watch::Watch;
 
 /// How to look.

@@ -7,11 +7,12 @@ pub(crate) enum Panel {
     Stages,
     Latency,
     Detections,
+    Tracks,
     Events,
 }
 
 impl Panel {
-    pub(crate) const ALL: [Self; 4] = [Self::Stages, Self::Latency, Self::Detections, Self::Events];
+    pub(crate) const ALL: [Self; 5] = [Self::Stages, Self::Latency, Self::Detections, Self::Tracks, Self::Events];
 }
 
 /// What the person at the terminal has chosen.
@@ -22,8 +23,9 @@ pub(crate) struct Ui {
     pub(crate) zoomed: bool,
     /// Groups of columns that the table of stages begins after.
     pub(crate) columns: usize,
-    /// First row of the detections, and events above the latest.
+    /// First row of the detections and of the tracks, and events above the latest.
     pub(crate) detections_from: usize,
+    pub(crate) tracks_from: usize,
     pub(crate) events_back: usize,
     pub(crate) paused: bool,
     pub(crate) help: bool,
@@ -60,7 +62,7 @@ impl Ui {
             KeyCode::Up => self.scroll(-1),
             KeyCode::PageDown => self.scroll(10),
             KeyCode::PageUp => self.scroll(-10),
-            KeyCode::Home => (self.detections_from, self.events_back) = (0, 0),
+            KeyCode::Home => (self.detections_from, self.tracks_from, self.events_back) = (0, 0, 0),
             _ => return Asked::Nothing,
         }
         Asked::Redraw
@@ -74,6 +76,7 @@ impl Ui {
     fn scroll(&mut self, rows: isize) {
         match self.panel {
             Panel::Detections => self.detections_from = self.detections_from.saturating_add_signed(rows),
+            Panel::Tracks => self.tracks_from = self.tracks_from.saturating_add_signed(rows),
             // The latest event is at the bottom.
             Panel::Events => self.events_back = self.events_back.saturating_add_signed(-rows),
             Panel::Stages | Panel::Latency => {}
@@ -92,7 +95,7 @@ mod tests {
     #[test]
     fn tab_goes_round_the_panels_and_back() {
         let mut sut = Ui::default();
-        for panel in [Panel::Latency, Panel::Detections, Panel::Events, Panel::Stages] {
+        for panel in [Panel::Latency, Panel::Detections, Panel::Tracks, Panel::Events, Panel::Stages] {
             assert_eq!(press(&mut sut, KeyCode::Tab), Asked::Redraw);
             assert_eq!(sut.panel, panel);
         }
@@ -110,6 +113,10 @@ mod tests {
         sut.panel = Panel::Events;
         press(&mut sut, KeyCode::Up);
         assert_eq!((sut.detections_from, sut.events_back), (2, 1));
+        sut.panel = Panel::Tracks;
+        press(&mut sut, KeyCode::PageDown);
+        press(&mut sut, KeyCode::Up);
+        assert_eq!((sut.detections_from, sut.tracks_from, sut.events_back), (2, 9, 1));
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub struct View {
     pub viewer: ProcessView,
     /// The latest sweep's obstacles.
     pub detections: DetectionsView,
+    /// Obstacles through time, at the end of the latest sweep.
+    pub tracks: TracksView,
     /// What happened, oldest first: the latest of the log.
     pub events: Vec<EventView>,
     /// What this viewer saw pass and what it missed.
@@ -152,6 +154,55 @@ pub struct DetectionRow {
     pub size_m: Option<[f32; 3]>,
     /// Its returns.
     pub points: u32,
+}
+
+/// Obstacles through time, at the end of a sweep.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TracksView {
+    /// The sweep; none before the first.
+    pub sweep: Option<u64>,
+    /// Whether the tracker could answer it; where not, there are no rows, and that says nothing of obstacles.
+    pub known: bool,
+    /// Tracks of each state: confirmed, coasting, tentative.
+    pub states: Vec<(&'static str, usize)>,
+    /// Tracks on alert.
+    pub alerts: usize,
+    /// The most dangerous first; at most [`TracksView::MAX_ROWS`].
+    pub rows: Vec<TrackRow>,
+}
+
+impl TracksView {
+    /// Most rows of a view.
+    pub const MAX_ROWS: usize = 200;
+}
+
+/// One obstacle through time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct TrackRow {
+    /// Its number.
+    pub track: u64,
+    /// `tentative`, `confirmed` or `coasting`.
+    pub state: &'static str,
+    /// Its likeliest class over all sweeps.
+    pub class: &'static str,
+    /// Probability of that class; none where it is unclassified.
+    pub p: Option<f32>,
+    /// Distance of its middle [m].
+    pub range_m: f32,
+    /// Speed relative to the sensor [m/s].
+    pub speed_mps: f32,
+    /// Sweeps since its birth, from 1.
+    pub age_sweeps: u32,
+    /// Sweeps since its last detection.
+    pub last_seen_sweeps: u32,
+    /// Until its closest approach [s]; none for a tentative track, like the two below.
+    pub time_s: Option<f32>,
+    /// Distance of its middle then [m].
+    pub distance_m: Option<f32>,
+    /// How likely it is met within the horizon.
+    pub collision_probability: Option<f32>,
+    /// Whether that is more than allowed.
+    pub alert: bool,
 }
 
 /// Something that happened.

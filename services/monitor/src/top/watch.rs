@@ -1,5 +1,5 @@
 use events::Reader;
-use messages::Detections;
+use messages::Tracks;
 use runtime::{Plan, clock};
 use transport::{Instance, Tap};
 
@@ -19,7 +19,7 @@ pub(super) struct Watch {
     instance: Instance,
     interval_ns: u64,
     /// None while no chain of this name runs. The tap before what it is a guest of.
-    chain: Option<(Tap<Detections>, Attached)>,
+    chain: Option<(Tap<Tracks>, Attached)>,
     /// The log of the chain.
     log: Reader,
     model: Model,
@@ -122,7 +122,7 @@ fn log(instance: &Instance) -> Reader {
     Reader::new(&Plan::events_path(instance), 0)
 }
 
-fn attach(instance: &Instance) -> Result<(Tap<Detections>, Attached), MonitorError> {
+fn attach(instance: &Instance) -> Result<(Tap<Tracks>, Attached), MonitorError> {
     let chain = Attached::to(instance, "top")?;
     Ok((chain.node.tap()?, chain))
 }

@@ -13,6 +13,8 @@ use crate::top::view::{LatencyView, View};
 
 /// Room for the scale.
 const SCALE: u16 = 8;
+/// Width of the whole title.
+const TITLE: u16 = 56;
 const BARS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"];
 /// What the scale's foot is of its deadline, and its top.
 const FOOT: f64 = 1e-2;
@@ -26,10 +28,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
         title.push(Span::raw(header::latency(view)));
     } else {
         let missed = if found.missed > 0 { theme::alarm() } else { theme::faint() };
-        title.push(Span::styled(
-            format!("of the last sweeps: {} answered, {} missed ", found.sweeps, found.missed),
-            missed,
-        ));
+        let of = if area.width < TITLE { "" } else { "of the last sweeps: " };
+        title.push(Span::styled(format!("{of}{} answered, {} missed ", found.sweeps, found.missed), missed));
     }
     let (block, inner) = titled(area, Line::from(title), chosen);
     block.render(area, frame.buffer_mut());

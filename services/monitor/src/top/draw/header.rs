@@ -5,8 +5,9 @@ use ratatui::widgets::Paragraph;
 
 use super::columns::{hundredths, tenths};
 use super::theme;
+use crate::top::text::probability;
 use crate::top::ui::Ui;
-use crate::top::view::View;
+use crate::top::view::{TrackRow, View};
 
 /// The state of the chain in three lines: what, how, how well.
 pub(in crate::top) fn header_lines(view: &View) -> [String; 3] {
@@ -14,8 +15,20 @@ pub(in crate::top) fn header_lines(view: &View) -> [String; 3] {
     let up = view.uptime_s.map_or("down".to_owned(), |s| format!("up {}", clock(s)));
     let (paced, name) = (view.pace, &view.instance);
     let first = format!("{name}   {}   {paced}, {sectors}   {up}", short(&view.source));
-    let second = format!("sweep {}   {:.1} sweeps/s   step {}", view.sweep, view.sweeps_per_s, view.step);
+    let (step, alert) = (view.step, alert(view));
+    let second = format!("sweep {}   {:.1} sweeps/s   step {step}{alert}", view.sweep, view.sweeps_per_s);
     [first, second, latency(view)]
+}
+
+/// What is likelier to be met than allowed, with the gap before it; nothing where there is none.
+fn alert(view: &View) -> String {
+    let first = view.tracks.rows.iter().find(|row| row.alert);
+    let Some(TrackRow { track, time_s: Some(time_s), collision_probability, .. }) = first else { return String::new() };
+    let more = match view.tracks.alerts {
+        1 => String::new(),
+        alerts => format!(" and {} more", alerts - 1),
+    };
+    format!("   ALERT #{track} p {} in {time_s:.1} s{more}", probability(*collision_probability))
 }
 
 /// Latency and margin of the last sweeps in a line.
@@ -45,6 +58,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
     }
     let second = match &view.notice {
         Some(notice) => Line::styled(format!(" {notice} "), theme::notice()),
+        None if view.tracks.alerts > 0 => Line::styled(second, theme::alarm()),
         None if view.step != "nominal" => Line::styled(second, theme::warning()),
         None => Line::from(second),
     };

@@ -5,11 +5,11 @@ use ratatui::widgets::{Block, Clear, Paragraph};
 
 use super::theme;
 
-const HELP: [&str; 16] = [
+const HELP: [&str; 18] = [
     "q, Ctrl-C    leave; the chain goes on",
     "tab          next panel; shift-tab the one before",
     "enter, z     the chosen panel alone, and back",
-    "up, down     scroll obstacles or events",
+    "up, down     scroll obstacles, tracks or events",
     "left, right  other columns of the stages",
     "p            pause what is shown; nothing is missed",
     "?            this",
@@ -20,6 +20,8 @@ const HELP: [&str; 16] = [
     "slips  parts that waited while it was busy",
     "late   sweeps that left it after the deadline",
     "▲      late      × not answered",
+    "t, d, p  closest approach: when, how near, how likely",
+    "!  on alert      ~  coasting      ?  tentative",
     "A margin is what the deadline leaves at p50,",
     "p99 and the longest of the last 100 sweeps.",
 ];

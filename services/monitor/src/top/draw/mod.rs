@@ -10,6 +10,7 @@ mod stages;
 #[cfg(test)]
 mod tests;
 mod theme;
+mod tracks;
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -24,7 +25,7 @@ pub(super) use header::header_lines;
 /// Below this the chosen panel alone is drawn.
 const LEAST_HEIGHT: u16 = 20;
 const LEAST_WIDTH: u16 = 64;
-/// From this on latency, detections and events stand side by side.
+/// From this on obstacles and tracks stand beside latency and events, with all of their columns.
 const WIDE: u16 = 150;
 
 /// Draws a view.
@@ -64,16 +65,20 @@ fn all(frame: &mut Frame<'_>, body: Rect, view: &View, ui: &Ui) {
         let [latency, events] = Layout::vertical([Constraint::Percentage(55), Constraint::Percentage(45)]).areas(left);
         panel(frame, latency, view, ui, Panel::Latency);
         panel(frame, events, view, ui, Panel::Events);
-        panel(frame, right, view, ui, Panel::Detections);
+        let [detections, tracks] = Layout::vertical([Constraint::Percentage(50); 2]).areas(right);
+        panel(frame, detections, view, ui, Panel::Detections);
+        panel(frame, tracks, view, ui, Panel::Tracks);
         return;
     }
-    let [latency, low] = Layout::vertical([Constraint::Percentage(45), Constraint::Percentage(55)]).areas(rest);
-    // The detections' columns are as wide as they are; events use what is left.
+    let [high, low] = Layout::vertical([Constraint::Percentage(45), Constraint::Percentage(55)]).areas(rest);
+    // The detections' columns are as wide as they are; tracks and events use what is left.
     let left = (body.width * 5 / 9).clamp(44, 62);
-    let [detections, events] = Layout::horizontal([Constraint::Length(left), Constraint::Min(0)]).areas(low);
+    let halves = Layout::horizontal([Constraint::Length(left), Constraint::Min(0)]);
+    let ([latency, events], [detections, tracks]) = (halves.areas(high), halves.areas(low));
     panel(frame, latency, view, ui, Panel::Latency);
-    panel(frame, detections, view, ui, Panel::Detections);
     panel(frame, events, view, ui, Panel::Events);
+    panel(frame, detections, view, ui, Panel::Detections);
+    panel(frame, tracks, view, ui, Panel::Tracks);
 }
 
 fn panel(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui, which: Panel) {
@@ -81,6 +86,7 @@ fn panel(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui, which: Panel) 
         Panel::Stages => stages::draw(frame, area, view, ui),
         Panel::Latency => graph::draw(frame, area, view, ui),
         Panel::Detections => detections::draw(frame, area, view, ui),
+        Panel::Tracks => tracks::draw(frame, area, view, ui),
         Panel::Events => events::draw(frame, area, view, ui),
     }
 }

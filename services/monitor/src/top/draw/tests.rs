@@ -2,7 +2,9 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
 use super::*;
-use crate::top::view::{DetectionRow, DetectionsView, EventView, LatencyView, StageView, TapView};
+use crate::top::view::{
+    DetectionRow, DetectionsView, EventView, LatencyView, StageView, TapView, TrackRow, TracksView,
+};
 
 fn view() -> View {
     let stage = |name: &str, busy: Option<f64>| StageView {
@@ -31,6 +33,20 @@ fn view() -> View {
         size_m: Some([1.0, 2.0, 3.0]),
         points: 321,
     };
+    let track = |number: u64| TrackRow {
+        track: 2_048 + number,
+        state: ["confirmed", "coasting", "tentative"][number as usize % 3],
+        class: "cylindrical",
+        p: Some(0.97),
+        range_m: 31.25,
+        speed_mps: 0.42,
+        age_sweeps: 12,
+        last_seen_sweeps: 0,
+        time_s: (number % 3 < 2).then_some(7.5),
+        distance_m: (number % 3 < 2).then_some(2.25),
+        collision_probability: (number % 3 < 2).then_some(if number == 0 { 0.125 } else { 1e-4 }),
+        alert: number == 0,
+    };
     View {
         instance: "flight-1".to_owned(),
         source: "/a/b/scenes/default.toml".to_owned(),
@@ -56,6 +72,13 @@ fn view() -> View {
             complete: true,
             classes: vec![("rectangular", 50), ("conical", 0)],
             rows: (0..50).map(|cluster| row(cluster, "rectangular")).collect(),
+        },
+        tracks: TracksView {
+            sweep: Some(1_233),
+            known: true,
+            states: vec![("confirmed", 14), ("coasting", 13), ("tentative", 13)],
+            alerts: 1,
+            rows: (0..40).map(track).collect(),
         },
         events: (0..30)
             .map(|number| EventView {
@@ -93,6 +116,11 @@ fn the_usual_terminal_shows_every_panel() {
     expect(&lines, &["extractor    running   360.0   16.5  16.50  33.00     3        2"]);
     expect(&lines, &[" stages ", " latency ", " obstacles of sweep 1233", " events ", "q quit", "100 ms ╌"]);
     expect(&lines, &["rect 50", "0.93", "12.50", "restarted: life 29"]);
+    expect(
+        &lines,
+        &[" tracks of sweep 1233", "ALERT 1  conf 14  coas 13  tent 13", "!    2048 cyli    7.5    2.2  0.125"],
+    );
+    assert!(lines[1].ends_with("step nominal   ALERT #2048 p 0.125 in 7.5 s"), "{}", lines[1]);
     assert!(lines[2].contains("margin to 100: 96.0 93.8 -40.0, 2 misses"), "{}", lines[2]);
 }
 
@@ -101,6 +129,7 @@ fn a_wide_terminal_shows_every_column_at_once() {
     let lines = drawn(200, 60, &view(), &Ui::default());
     expect(&lines, &["pid", "MiB", "lost", "late", "123456", "1.00 × 2.00 × 3.00", "unseen here: 100 parts (10.0 %)"]);
     assert!(!lines.iter().any(|line| line.contains("more columns")));
+    expect(&lines, &["    2048 cylindrical confirmed  0.42    31.2    7.5    2.2  0.125"]);
     let again = drawn(120, 45, &view(), &Ui::default());
     expect(&again, &["p99 ms", "lost", "pid"]);
 }
@@ -139,7 +168,8 @@ fn no_size_is_too_small_and_no_view_too_empty() {
         for width in [0, 1, 2, 7, 8, 9, 10, 45, 63, 64, 65, 149, 150, 300] {
             for height in [0, 1, 2, 3, 4, 5, 6, 7, 19, 20, 21, 33, 80] {
                 for panel in Panel::ALL {
-                    let ui = Ui { panel, help: true, detections_from: 1_000, events_back: 1_000, ..Ui::default() };
+                    let far = Ui { detections_from: 1_000, tracks_from: 1_000, events_back: 1_000, ..Ui::default() };
+                    let ui = Ui { panel, help: true, ..far };
                     drawn(width, height, &view, &ui);
                     drawn(width, height, &view, &Ui { zoomed: true, help: false, ..ui });
                 }
@@ -159,6 +189,17 @@ fn scrolling_shows_older_events_and_farther_obstacles_and_stops_at_their_end() {
 }
 
 #[test]
+fn states_of_tracks_have_signs_of_their_own_and_what_is_not_known_is_called_so() {
+    let ui = Ui { panel: Panel::Tracks, zoomed: true, ..Ui::default() };
+    let lines = drawn(80, 24, &view(), &ui);
+    expect(&lines, &["!    2048", "~    2049", "?    2050", "tentative  0.42    31.2      -      -      -", "<.001"]);
+    let scrolled = drawn(80, 24, &view(), &Ui { tracks_from: 1_000, ..ui });
+    expect(&scrolled, &["     2087 cylindrical"]);
+    let tracks = TracksView { sweep: Some(7), ..TracksView::default() };
+    expect(&drawn(80, 24, &View { tracks, ..view() }, &Ui::default()), &["of sweep 7: NOT KNOWN"]);
+}
+
+#[test]
 fn a_notice_and_a_pause_are_to_be_seen() {
     let view = View { notice: Some("the chain has ended".to_owned()), uptime_s: None, ..view() };
     let lines = drawn(80, 24, &view, &Ui { paused: true, ..Ui::default() });
@@ -172,4 +213,9 @@ fn text_for_pipes_says_what_the_screen_says() {
     let text = crate::top::text::snapshot(&view());
     let lines: Vec<String> = text.lines().map(str::to_owned).collect();
     expect(&lines, &["flight-1", "margin to 100", "123456", "sweep 1233: 50 clusters", "restarted: life 29", "93"]);
+    expect(&lines, &["tracks of sweep 1233: 14 confirmed, 13 coasting, 13 tentative, 1 on alert", "ALERT #2048"]);
+    expect(
+        &lines,
+        &["    2048  confirmed  cylindrical   0.97      0.42       31.25          2.25     7.50       0.125  ALERT"],
+    );
 }

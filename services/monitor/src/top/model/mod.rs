@@ -4,13 +4,14 @@ mod detections;
 mod sweeps;
 #[cfg(test)]
 mod tests;
+mod tracks;
 
 use std::collections::VecDeque;
 
-use messages::{Detections, Step, Trace};
+use messages::{Step, Trace, Tracks};
 use runtime::page::{Counts, State};
 
-use super::view::{ProcessView, StageView, TapView, View};
+use super::view::{ProcessView, StageView, TapView, TracksView, View};
 use crate::attached::Facts;
 use crate::events::Events;
 use crate::process::Usage;
@@ -26,6 +27,7 @@ pub(crate) struct Model {
     facts: Facts,
     sweeps: Sweeps,
     collector: Collector,
+    tracks: TracksView,
     events: Events,
     /// Looks of the last [`RATE_NS`] and the one before, the latest last.
     marks: VecDeque<Mark>,
@@ -48,6 +50,7 @@ impl Model {
             sweeps: Sweeps::new(&facts),
             facts,
             collector: Collector::default(),
+            tracks: TracksView::default(),
             events: Events::default(),
             marks: VecDeque::new(),
             uptime_s: None,
@@ -64,9 +67,12 @@ impl Model {
     }
 
     /// Adds a part that the tap saw.
-    pub(crate) fn part(&mut self, trace: &Trace, message: &Detections) {
+    pub(crate) fn part(&mut self, trace: &Trace, message: &Tracks) {
         let whole = self.sweeps.add(trace);
-        self.collector.add(&trace.part, message, whole);
+        self.collector.add(&trace.part, &message.detections, whole);
+        if let Some(tracks) = tracks::view(&trace.part, &message.table) {
+            self.tracks = tracks;
+        }
     }
 
     /// Adds a look. Looks come in order of time.
@@ -114,6 +120,7 @@ impl Model {
             supervisor: self.process(|sample| sample.supervisor),
             viewer: self.process(|sample| sample.viewer),
             detections: self.collector.view(),
+            tracks: self.tracks.clone(),
             events: self.events.views(),
             tap: self.sweeps.tap(),
         }

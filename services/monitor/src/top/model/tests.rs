@@ -1,5 +1,5 @@
 use events::EventId;
-use messages::{ClusterSummary, Detection, Hop, Part, Verdict};
+use messages::{ClusterSummary, Detection, Hop, Part, Track, Verdict};
 use runtime::page::Counts;
 use zerocopy::FromZeros;
 
@@ -40,8 +40,8 @@ fn trace(sweep: u64, sector: u32, sequence: u64, latency_ms: u64) -> Trace {
     trace
 }
 
-fn nothing() -> Box<Detections> {
-    Detections::new_box_zeroed().unwrap()
+fn nothing() -> Box<Tracks> {
+    Tracks::new_box_zeroed().unwrap()
 }
 
 fn sweep(sut: &mut Model, sweep: u64, latency_ms: u64) {
@@ -242,11 +242,11 @@ fn obstacles_are_numbered_by_key_and_shown_by_range_those_with_a_class_first() {
     use lidar::ObstacleClass::{Rectangular, Unclassified};
     let mut sut = sut();
     let mut message = nothing();
-    message.detections.push(detection(30, Unclassified, 1.0)).unwrap();
-    message.detections.push(detection(40, Rectangular, 9.0)).unwrap();
+    message.detections.detections.push(detection(30, Unclassified, 1.0)).unwrap();
+    message.detections.detections.push(detection(40, Rectangular, 9.0)).unwrap();
     sut.part(&trace(0, 0, 0, 4), &message);
-    message.detections.clear();
-    message.detections.push(detection(20, Rectangular, 5.0)).unwrap();
+    message.detections.detections.clear();
+    message.detections.detections.push(detection(20, Rectangular, 5.0)).unwrap();
     sut.part(&trace(0, 1, 1, 4), &message);
     let DetectionsView { sweep, complete, rows, classes } = sut.view().detections;
     assert_eq!((sweep, complete), (Some(0), true));
@@ -254,4 +254,20 @@ fn obstacles_are_numbered_by_key_and_shown_by_range_those_with_a_class_first() {
     assert_eq!(shown, [(0, 5.0, Some(0.7)), (2, 9.0, Some(0.7)), (1, 1.0, None)]);
     assert_eq!(classes[0], ("rectangular", 2));
     assert_eq!(classes[4], ("unclassified", 1));
+}
+
+#[test]
+fn tracks_that_are_not_known_any_more_are_not_shown_as_if_they_were() {
+    let mut sut = sut();
+    let mut message = nothing();
+    message.table.time_ns = 1;
+    message.table.tracks.push(Track::default()).unwrap();
+    sut.part(&trace(0, 1, 1, 4), &message);
+    // The table comes with the last part.
+    sut.part(&trace(1, 0, 2, 4), &nothing());
+    let view = sut.view().tracks;
+    assert_eq!((view.sweep, view.known, view.rows.len()), (Some(0), true, 1));
+    sut.part(&trace(1, 1, 3, 4), &nothing());
+    let view = sut.view().tracks;
+    assert_eq!((view.sweep, view.known, view.rows.len()), (Some(1), false, 0));
 }
