@@ -10,6 +10,8 @@ function wire(viewer) {
   const colour = (by) => { $("colour").value = viewer.by = by; viewer.refresh(); };
   $("colour").addEventListener("change", () => colour($("colour").value));
   for (const id of ["size", "solids", "names"]) $(id).addEventListener("input", () => viewer.redraw());
+  $("tracks").addEventListener("input", () => viewer.refresh());
+  for (const name of ["obstacles", "tracks"]) $(`list-${name}`).addEventListener("click", () => viewer.chooseList(name));
   $("fit").addEventListener("click", () => viewer.camera.fit(viewer.camera.reach));
   $("top").addEventListener("click", () => viewer.camera.above());
   $("side-on").addEventListener("click", () => viewer.camera.level());
@@ -22,6 +24,7 @@ function wire(viewer) {
     const keys = {
       " ": () => play(viewer, !viewer.playing), ArrowLeft: () => step(-far), ArrowRight: () => step(far),
       Home: () => step(-Infinity), End: () => step(Infinity), "?": help, Escape: () => viewer.choose(null),
+      k: () => { if (viewer.tracked) { $("tracks").checked = !$("tracks").checked; viewer.refresh(); } },
       c: () => colour(options[(options.indexOf(viewer.by) + 1) % options.length]),
     };
     if (keys[event.key]) keys[event.key]();
@@ -64,7 +67,7 @@ function hover(viewer, event) {
     return;
   }
   const box = cloud.getBoundingClientRect(), [x, y] = [event.clientX - box.left, event.clientY - box.top];
-  viewer.hover = pick(sweep, view, x, y, box.width, box.height, viewer.hidden, $("solids").checked);
+  viewer.hover = pick(sweep, view, x, y, box.width, box.height, viewer.hidden, $("solids").checked, viewer.coasting);
   tip.hidden = !viewer.hover;
   if (!viewer.hover) return;
   const [title, ...lines] = said(sweep, viewer.hover, viewer.classes), head = document.createElement("b");

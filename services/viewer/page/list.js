@@ -6,7 +6,7 @@ const LEAST_POINTS = 5;
 class List {
   constructor(classes, pick) {
     Object.assign(this, { classes, pick, sort: "range", down: false, rows: document.getElementById("rows") });
-    this.heads = [...document.querySelectorAll("th button")];
+    this.heads = [...document.querySelectorAll("#scroll th button")];
     for (const head of this.heads) {
       head.addEventListener("click", () => {
         this.down = this.sort === head.dataset.sort ? !this.down : ["points", "size", "sure"].includes(head.dataset.sort);
@@ -29,8 +29,11 @@ class List {
     const small = sweep.clusters.length - sweep.clusters.filter((cluster) => cluster.points >= LEAST_POINTS).length;
     const more = large.length > MOST_ROWS ? `, ${large.length - MOST_ROWS} more not listed` : "";
     const text = `${counted(large.length, "obstacle")}${more}`;
-    document.getElementById("counted").textContent = small > 0 ? `${text}; ${counted(small, "cluster")} under ${LEAST_POINTS} returns` : text;
+    this.text = small > 0 ? `${text}; ${counted(small, "cluster")} under ${LEAST_POINTS} returns` : text;
   }
+
+  // What stands below the table.
+  counted() { return this.text; }
 
   row(cluster) {
     const row = document.createElement("tr");

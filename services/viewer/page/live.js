@@ -21,6 +21,7 @@ async function watch(viewer) {
     const { kept } = viewer;
     if (kept.length === 0) continue;
     viewer.plots.look();
+    viewer.offerTracks();
     $("slider").max = kept.length - 1;
     const at = kept.findIndex((place) => overview.sweep[place] === shown);
     const newest = kept.length - 1;

@@ -9,8 +9,11 @@ function message(text) {
   if (text) signals.failed = text;
 }
 
-// The cluster of another sweep that is where this one was: the nearest whose middle moved by less than a metre.
+// What in another sweep is of the same track; where there is none, the cluster that is where this one was: the nearest whose
+// middle moved by less than a metre.
 function again(was, sweep) {
+  const id = was.track?.id ?? was.id, track = sweep.tracks?.find((track) => track.id === id);
+  if (track) return track.cluster ?? track;
   const middle = (cluster) => cluster.solid?.centre ?? cluster.at;
   const moved = (cluster) => Math.hypot(...less(middle(cluster), middle(was)));
   const near = sweep.clusters.filter((cluster) => cluster.points >= LEAST_POINTS && moved(cluster) < 1);
@@ -26,7 +29,10 @@ class Viewer {
     this.camera = new Camera($("cloud"), () => this.redraw());
     this.plots = new Plots(store, this.classes, (place) => this.goTo(this.nearestKept(place)));
     this.list = new List(this.classes, (cluster) => this.choose(cluster, true));
+    this.trackList = new TrackList(this.classes, (picked) => this.choose(picked, true));
+    this.listed = "obstacles";
     this.describe();
+    this.offerTracks();
     this.legend();
     wire(this);
     new ResizeObserver(() => this.resize()).observe($("view"));
@@ -52,6 +58,29 @@ class Viewer {
     }
     $("slider").max = this.kept.length - 1;
   }
+
+  // Tracks are offered where the recording has any.
+  offerTracks() {
+    this.tracked = this.store.overview.tracks.some((tracks) => tracks >= 0);
+    for (const id of ["tracks-offer", "lists"]) $(id).hidden = !this.tracked;
+    if (this.tracked) signals.tracked = "yes";
+  }
+
+  // Which of the tables is to be seen.
+  chooseList(name) {
+    this.listed = name;
+    $("scroll").hidden = name !== "obstacles";
+    $("tracked").hidden = name !== "tracks";
+    for (const each of ["obstacles", "tracks"]) $(`list-${each}`).setAttribute("aria-pressed", String(each === name));
+    $("counted").textContent = (name === "tracks" ? this.trackList : this.list).counted();
+  }
+
+  // Those to be drawn.
+  get drawnTracks() {
+    return $("tracks").checked ? (this.sweep?.tracks ?? []).filter((track) => !this.hidden.has(track.kind)) : [];
+  }
+
+  get coasting() { return coastingBodies(this.drawnTracks, this.hidden); }
 
   legend() {
     for (const kind of this.store.about.classes) {
@@ -130,13 +159,21 @@ class Viewer {
     if (!sweep) return;
     const { colours, ends: span } = pointColours(sweep, by, this.classes, hidden, picked?.number);
     this.scene.setPoints(sweep.positions, colours);
+    const alarmed = $("tracks").checked;
+    const bodyColour = (body) => {
+      if (alarmed && (body.alert || body.track?.alert)) return rgb(this.store.about.alert);
+      return by === "cluster" && body.number >= 0 ? clusterColour(body.number) : this.classes[body.kind].rgb;
+    };
     const solids = sweep.clusters.filter((cluster) => cluster.solid && !hidden.has(cluster.kind) && cluster.kind > 0);
-    this.scene.setSolids(solids.map((cluster) => ({
-      ...cluster.solid, kind: cluster.kind, strength: !picked || picked === cluster ? 1 : 0.45,
-      rgb: by === "cluster" ? clusterColour(cluster.number) : this.classes[cluster.kind].rgb,
+    this.scene.setSolids([...solids, ...this.coasting].map((body) => ({
+      ...body.solid, kind: body.kind, strength: (!picked || picked === body ? 1 : 0.45) * (body.id === undefined ? 1 : 0.6), rgb: bodyColour(body),
     })));
     showRamp(span, by);
     this.list.show(sweep, hidden, picked);
+    this.trackList.show(sweep.tracks, hidden, picked);
+    this.chooseList(this.listed);
+    const alerts = this.store.overview.alerts[this.kept[this.at]];
+    $("alerts").textContent = alerts > 0 ? `▲ ${alerts}` : "";
     for (const kind of this.store.about.classes) kind.count.textContent = this.store.overview[kind.name][this.kept[this.at]];
     this.plots.at = this.kept[this.at];
     this.plots.draw();
@@ -149,6 +186,8 @@ class Viewer {
     const parts = [`sweep ${overview.sweep[place]}`, `${(overview.time_ms[place] / 1000).toFixed(1)} s`, counted(overview.returns[place], "return")];
     if (this.sweep.count < overview.returns[place]) parts.push(`${this.sweep.count.toLocaleString("en")} shown`);
     if (!overview.complete[place]) parts.push("partial turn");
+    if (overview.tracks[place] >= 0) parts.push(counted(overview.tracks[place], "track"));
+    if (overview.alerts[place] > 0) parts.push(`${overview.alerts[place]} on alert`);
     if (step > 0) parts.push(`step ${about.steps[step] ?? step}`);
     $("now").value = parts.join(" · ");
     const named = this.store.about.classes.map((kind) => `${overview[kind.name][place]} ${kind.name}`).join(", ");
@@ -188,7 +227,8 @@ class Viewer {
     const view = this.view = this.camera.view(canvas.width / canvas.height);
     scene.draw(view, Number($("size").value) * devicePixelRatio, $("solids").checked);
     const named = $("names").checked ? sweep.clusters.filter((cluster) => cluster.kind > 0 && !this.hidden.has(cluster.kind)) : [];
-    this.overlay.draw(scene, view, named, this.picked, this.classes);
+    const colourOf = (track) => track.alert ? this.store.about.alert : this.classes[track.kind].colour;
+    this.overlay.draw(scene, view, named, this.picked, this.classes, this.drawnTracks, colourOf);
     if (signals.sweep !== String(this.number)) this.signal();
   }
 
@@ -197,7 +237,7 @@ class Viewer {
     if (!signals.lit) Object.assign(signals, this.scene.checked());
     Object.assign(signals, {
       sweep: this.number, sweeps: this.kept.length, points: this.sweep.count,
-      clusters: this.sweep.clusters.length, solids: this.scene.count, drawn: "yes",
+      clusters: this.sweep.clusters.length, solids: this.scene.count, tracks: this.drawnTracks.length, drawn: "yes",
     });
   }
 }
@@ -223,9 +263,13 @@ async function main() {
   const wanted = new URLSearchParams(location.hash.slice(1));
   if ([...$("colour").options].some((option) => option.value === wanted.get("colour"))) $("colour").value = viewer.by = wanted.get("colour");
   $("names").checked = wanted.has("names");
+  $("tracks").checked = wanted.get("tracks") !== "0";
+  if (viewer.tracked && wanted.get("list") === "tracks") viewer.listed = "tracks";
   const sweep = store.about.kept.findIndex((place) => String(store.overview.sweep[place]) === wanted.get("sweep"));
   await viewer.goTo(Math.max(sweep, 0));
   const cluster = viewer.sweep?.clusters[Number(wanted.get("cluster") ?? NaN)];
+  const track = viewer.sweep?.tracks?.find((track) => String(track.id) === wanted.get("track"));
   if (cluster) viewer.choose(cluster, true);
+  else if (track) viewer.choose(track.cluster ?? track, true);
 }
 main().catch((cause) => message(cause.message));

@@ -1,4 +1,4 @@
-// Words over the scene: distances on the rings, axes, names of obstacles, the mark round the one that is picked.
+// What stands over the scene: distances on the rings, axes, tracks, names of obstacles, the mark round the one that is picked.
 
 class Overlay {
   constructor(canvas) {
@@ -6,7 +6,8 @@ class Overlay {
     this.pen = canvas.getContext("2d");
   }
 
-  draw(scene, view, clusters, picked, classes) {
+  // `tracks` are those to be drawn, `colourOf` says in which colour.
+  draw(scene, view, clusters, picked, classes, tracks, colourOf) {
     const { pen, canvas } = this, scale = devicePixelRatio;
     const [width, height] = [canvas.width / scale, canvas.height / scale];
     pen.setTransform(scale, 0, 0, scale, 0, 0);
@@ -22,6 +23,8 @@ class Overlay {
       pen.fillStyle = colour;
       pen.fillText(text, p[0], p[1] - up);
     };
+    drawTracks(pen, tracks, (at) => projected(view.matrix, at, width, height), colourOf, word);
+    pen.font = "11px system-ui, sans-serif";
     const side = Math.SQRT1_2;
     for (const radius of scene.rings) word(`${radius} m`, [-radius * side, -radius * side, 0], "#7f8d9c");
     for (const [axis, colour, name] of AXES) word(name, times(axis, scene.axis * 1.25), colour);
@@ -46,6 +49,8 @@ class Overlay {
     pen.setLineDash([]);
     pen.fillStyle = colour;
     pen.font = "600 12px system-ui, sans-serif";
-    pen.fillText(cluster.kind > 0 ? `${name} ${percent(cluster.sure)}` : name, p[0], p[1] - radius - 7);
+    const track = cluster.track ?? (cluster.id === undefined ? null : cluster);
+    const text = cluster.kind > 0 ? `${name} ${percent(cluster.sure)}` : name;
+    pen.fillText(track ? `${text} · #${track.id}` : text, p[0], p[1] - radius - 7);
   }
 }

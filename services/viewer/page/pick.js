@@ -2,13 +2,14 @@
 
 const NEAR_PX = 5;
 
-function pick(sweep, view, x, y, width, height, hidden, solids) {
+function pick(sweep, view, x, y, width, height, hidden, solids, coasting) {
   const point = nearestReturn(sweep, view.matrix, x, y, width, height, hidden);
   if (point >= 0) return { point, cluster: sweep.clusters[sweep.cluster[point]] ?? null };
   const tan = Math.tan(FOV / 2), u = (2 * x / width - 1) * tan * view.aspect, v = (1 - 2 * y / height) * tan;
   const ray = unit(add(view.forward, add(times(view.right, u), times(view.up, v))));
   let best = null, nearest = Infinity;
-  for (const cluster of solids ? sweep.clusters : []) {
+  // Also what coasts, where tracks are drawn.
+  for (const cluster of solids ? [...sweep.clusters, ...coasting] : []) {
     if (!cluster.solid || hidden.has(cluster.kind)) continue;
     const met = boxMet(cluster.solid, view.eye, ray);
     if (met < nearest) [best, nearest] = [cluster, met];
@@ -48,7 +49,11 @@ function boxMet({ centre, turn, size }, eye, ray) {
 // The lines of a label: the first is its title.
 function said(sweep, { point, cluster }, classes) {
   const lines = [];
-  if (cluster) {
+  if (cluster?.id !== undefined) {
+    const { kind, sure, range, solid } = cluster;
+    lines.push(kind > 0 ? `${classes[kind].name} ${percent(sure)}` : classes[0].name, ...trackSaid(cluster));
+    lines.push(`${range.toFixed(2)} m away`, `${sizeOf(solid)} m, centre ± ${solid.sigma.toFixed(2)} m`);
+  } else if (cluster) {
     const { kind, posterior, solid } = cluster;
     lines.push(kind > 0 ? `${classes[kind].name} ${percent(cluster.sure)}` : classes[0].name);
     if (kind > 0) {
@@ -58,6 +63,7 @@ function said(sweep, { point, cluster }, classes) {
     lines.push(`cluster ${cluster.number} · ${counted(cluster.points, "return")}${cluster.rings > 0 ? ` on ${counted(cluster.rings, "ring")}` : ""}`);
     lines.push(`${cluster.range.toFixed(2)} m away`);
     if (solid) lines.push(`${sizeOf(solid)} m, centre ± ${solid.sigma.toFixed(2)} m`);
+    if (cluster.track) lines.push(...trackSaid(cluster.track));
   } else {
     lines.push("in no cluster");
   }

@@ -125,7 +125,7 @@ class Plots {
 
   drawStack() {
     const kinds = this.classes.filter((kind) => kind.number > 0 && this.shown.has(kind.number));
-    const { overview, about } = this.store, { step } = overview, counts = kinds.map((kind) => overview[kind.name]);
+    const { overview, about } = this.store, { step, alerts } = overview, counts = kinds.map((kind) => overview[kind.name]);
     const sum = (i) => counts.reduce((all, values) => all + values[i], 0);
     this.show(this.stack, [...this.shown].sort().join() + ` ${this.looks}`, (pen, width, height) => {
       let most = 1;
@@ -134,6 +134,8 @@ class Plots {
       const each = (width - LEFT - RIGHT) / this.sweeps, wide = Math.max(each * 0.86, 1);
       pen.fillStyle = "#f0c67426";
       for (let i = 0; i < this.sweeps; i++) if (step[i] > 0) pen.fillRect(this.x(i, width) - each / 2, TOP, each, height - TOP - LOW);
+      pen.fillStyle = about.alert;
+      for (let i = 0; i < this.sweeps; i++) if (alerts[i] > 0) pen.fillRect(this.x(i, width) - wide / 2, TOP - 5, wide, 4);
       for (let i = 0; i < this.sweeps; i++) {
         let low = 0;
         kinds.forEach((kind, k) => {
@@ -146,7 +148,7 @@ class Plots {
     const place = this.over ?? this.at;
     const here = kinds.map((kind, k) => `${counts[k][place]} ${kind.name}`).join(", ");
     document.getElementById("classes-said").textContent =
-      `· ${sum(place)} in sweep ${overview.sweep[place]}${step[place] > 0 ? ` · overload (shaded): ${about.steps[step[place]] ?? step[place]}` : ""}`;
+      `· ${sum(place)} in sweep ${overview.sweep[place]}${alerts[place] > 0 ? ` · ${alerts[place]} on alert` : ""}${step[place] > 0 ? ` · overload (shaded): ${about.steps[step[place]] ?? step[place]}` : ""}`;
     this.stack.setAttribute("aria-label", `Obstacles by class over time. Sweep ${this.store.overview.sweep[place]}: ${here}`);
   }
 }

@@ -35,7 +35,7 @@ class Store {
   }
 }
 
-// Columns as the scene wants them: positions side by side, clusters with their solids.
+// Columns as the scene wants them: positions side by side, clusters with their solids and tracks.
 function arranged(columns) {
   const x = column(columns, "x"), y = column(columns, "y"), z = column(columns, "z");
   const positions = new Float32Array(3 * x.length);
@@ -51,7 +51,7 @@ function arranged(columns) {
     range: Math.hypot(columns.cx[i], columns.cy[i], columns.cz[i]),
     posterior: [columns.p0[i], columns.p1[i], columns.p2[i], columns.p3[i]],
     sure: kind > 0 ? columns[`p${kind - 1}`][i] : 0,
-    solid: null, size: 0,
+    solid: null, size: 0, track: null,
   }));
   column(columns, "of").forEach((of, i) => {
     const size = [columns.a[i], columns.b[i], columns.c[i]];
@@ -64,7 +64,7 @@ function arranged(columns) {
     clusters[of].size = Math.max(...size);
   });
   return {
-    positions, range, height: z, count: x.length, clusters,
+    tracks: tracksOf(columns, clusters), positions, range, height: z, count: x.length, clusters,
     cluster: column(columns, "cluster"), ring: column(columns, "ring"), intensity: column(columns, "intensity"),
   };
 }

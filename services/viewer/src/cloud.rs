@@ -1,6 +1,8 @@
-use messages::{Detections, Solid, Sweep};
+use messages::{Detections, Solid, Sweep, TrackTable};
 
 use crate::columns::Columns;
+use crate::paths::Paths;
+use crate::tracks;
 
 /// What positions of returns and centroids are rounded to [m]: the step in which an HDL-32E says its ranges.
 pub const POINT_UNIT_M: f64 = 0.002;
@@ -13,22 +15,32 @@ const PROBABILITY_UNIT: f64 = 1e-3;
 /// Rings that a return can name.
 const RINGS: usize = u8::MAX as usize + 1;
 
+/// What is known of one sweep.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Known<'a> {
+    /// Its number.
+    pub(crate) number: u32,
+    pub(crate) sweep: Option<&'a Sweep>,
+    pub(crate) detections: Option<&'a Detections>,
+    /// Its tracks, and where they were before.
+    pub(crate) tracks: Option<(&'a TrackTable, &'a Paths)>,
+}
+
 /// One sweep as the page draws it. Columns `x y z cluster ring intensity` of its returns, ring after ring (neighbours are
 /// alike, and deflate well); `class points rings cx cy cz p0…p3` of its clusters by number; `of sx sy sz qw qx qy qz a b c
 /// sigma` of its solids. A return without a cluster has −1; `of` is the cluster of a solid; `sigma` is the standard
-/// deviation of its centre. At most `most_points` returns: every k-th is kept where there are more.
-pub(crate) fn encode(
-    sweep: Option<&Sweep>,
-    detections: Option<&Detections>,
-    most_points: usize,
-) -> std::io::Result<Vec<u8>> {
+/// deviation of its centre. Columns of tracks (see [`tracks::put`]) only where they are known. At most `most_points` returns: every k-th is kept where there are more.
+pub(crate) fn encode(known: Known<'_>, most_points: usize) -> std::io::Result<Vec<u8>> {
     let mut columns = Columns::default();
-    if let Some(sweep) = sweep {
-        returns(sweep, &owners(detections), most_points, &mut columns);
+    if let Some(sweep) = known.sweep {
+        returns(sweep, &owners(known.detections), most_points, &mut columns);
     }
-    if let Some(detections) = detections {
+    if let Some(detections) = known.detections {
         clusters(detections, &mut columns);
         solids(detections, &mut columns);
+    }
+    if let Some((table, paths)) = known.tracks {
+        tracks::put(table, known.detections, &paths.trails(known.number, table), &mut columns);
     }
     columns.finish()
 }

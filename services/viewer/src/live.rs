@@ -1,15 +1,17 @@
 use std::collections::BTreeMap;
 
-use messages::{Detections, Joiner, Raw, Sweep, Trace};
+use messages::{Detections, Joiner, Raw, Sweep, Trace, TrackTable, Tracks};
 use runtime::{Pace, Plan, Shutdown, clock};
 use tape::DetectionsJoiner;
 use transport::{Instance, Node, Tap};
 use zerocopy::FromZeros;
 
+use crate::cloud::{self, Known};
 use crate::page::{self, About};
-use crate::recording::{Row, note_detections, note_sweep};
+use crate::paths::Paths;
+use crate::row::{Row, note_detections, note_sweep, note_tracks};
 use crate::shelf::Shelf;
-use crate::{ViewError, cloud, overview};
+use crate::{ViewError, overview};
 
 /// Sweeps of which the numbers are kept: five minutes at 10 Hz.
 const ROWS: usize = 3_000;
@@ -19,12 +21,14 @@ const LOOK_NS: u64 = 1_000_000_000;
 const NAME: &str = "view";
 /// Newest sweeps that can be shown; some 70 MB of an HDL-32E's.
 const SWEEPS: usize = 64;
+/// Newest sweeps of which it is known where the tracks were: those, and what their trails reach back to.
+const PATHS: usize = 2 * SWEEPS;
 
 /// What a running chain says, as far as it is kept. The chain neither waits for it nor knows of it.
 pub struct Live {
     // The taps before the node whose guests they are.
     sweeps: Tap<Sweep>,
-    detections: Tap<Detections>,
+    tracks: Tap<Tracks>,
     node: Node,
     instance: Instance,
     queue_parts: usize,
@@ -38,6 +42,8 @@ pub struct Live {
     seen: BTreeMap<u32, Seen>,
     sweep: Box<Sweep>,
     found: Box<Detections>,
+    table: Box<TrackTable>,
+    paths: Paths,
 }
 
 /// One sweep: its numbers, and its messages as long as they are kept. Nothing is encoded before somebody asks.
@@ -46,6 +52,7 @@ struct Seen {
     row: Row,
     sweep: Option<Vec<u8>>,
     found: Option<Vec<u8>>,
+    table: Option<Vec<u8>>,
 }
 
 impl Live {
@@ -67,7 +74,7 @@ impl Live {
         }
         Ok(Self {
             sweeps: node.tap()?,
-            detections: node.tap()?,
+            tracks: node.tap()?,
             node,
             instance: instance.clone(),
             queue_parts: plan.chain.queue_parts(),
@@ -81,6 +88,8 @@ impl Live {
             seen: BTreeMap::new(),
             sweep: Sweep::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
             found: Detections::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
+            table: TrackTable::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
+            paths: Paths::default(),
         })
     }
 
@@ -95,8 +104,8 @@ impl Live {
             return;
         }
         let Ok(node) = Node::visit(&self.instance, NAME, self.queue_parts) else { return };
-        if let (Ok(sweeps), Ok(detections)) = (node.tap(), node.tap()) {
-            (self.sweeps, self.detections) = (sweeps, detections);
+        if let (Ok(sweeps), Ok(tracks)) = (node.tap(), node.tap()) {
+            (self.sweeps, self.tracks) = (sweeps, tracks);
             self.node = node;
         }
     }
@@ -119,9 +128,15 @@ impl Live {
                 whole.write_raw(seen.sweep.insert(Vec::new()));
             }
         }
-        while let Some(taken) = self.detections.take()? {
-            let part = taken.trace().part;
-            if let Some(whole) = self.detections_joiner.add(&part, taken.message()) {
+        while let Some(taken) = self.tracks.take()? {
+            let (part, Tracks { detections, table }) = (taken.trace().part, taken.message());
+            if part.is_last() && table.time_ns > 0 {
+                let seen = entry(&mut self.seen, part.sweep);
+                note_tracks(table, &mut seen.row);
+                self.paths.note(seen.row.sweep, table);
+                table.write_raw(seen.table.insert(Vec::new()));
+            }
+            if let Some(whole) = self.detections_joiner.add(&part, detections) {
                 let seen = entry(&mut self.seen, part.sweep);
                 note_detections(taken.trace(), whole, seen.sweep.is_some(), &mut seen.row);
                 let bytes = seen.found.insert(Vec::new());
@@ -134,8 +149,9 @@ impl Live {
         }
         let old = self.seen.len().saturating_sub(SWEEPS);
         for seen in self.seen.values_mut().take(old).rev().take(SWEEPS) {
-            (seen.sweep, seen.found) = (None, None);
+            (seen.sweep, seen.found, seen.table) = (None, None, None);
         }
+        self.paths.keep(PATHS);
         Ok(())
     }
 }
@@ -172,11 +188,14 @@ impl Shelf for Live {
     }
 
     fn sweep(&mut self, number: u32) -> Result<Option<Vec<u8>>, ViewError> {
-        let Some(Seen { sweep, found: Some(found), .. }) = self.seen.get(&number) else { return Ok(None) };
-        // Both were written by us.
+        let Some(Seen { sweep, found: Some(found), table, .. }) = self.seen.get(&number) else { return Ok(None) };
+        // All were written by us.
         let sweep = sweep.as_ref().filter(|bytes| self.sweep.read_raw(bytes).is_ok()).map(|_| &*self.sweep);
         let read = Trace::read_raw(found).and_then(|(_, bytes)| self.found.read_raw(bytes));
-        let found = read.is_ok().then_some(&*self.found);
-        cloud::encode(sweep, found, self.most_points).map(Some).map_err(ViewError::Write)
+        let detections = read.is_ok().then_some(&*self.found);
+        let table = table.as_ref().filter(|bytes| self.table.read_raw(bytes).is_ok()).map(|_| &*self.table);
+        let tracks = table.map(|table| (table, &self.paths));
+        let known = Known { number, sweep, detections, tracks };
+        cloud::encode(known, self.most_points).map(Some).map_err(ViewError::Write)
     }
 }

@@ -1,5 +1,5 @@
 use crate::columns::Columns;
-use crate::recording::Row;
+use crate::row::Row;
 
 /// What sensor times and latencies are rounded to [ms].
 const TIME_UNIT_MS: f64 = 0.1;
@@ -7,7 +7,7 @@ const LATENCY_UNIT_MS: f64 = 0.001;
 
 /// All sweeps as the page's plots need them: columns `sweep time_ms returns latency_ms step complete` and
 /// `unclassified rectangular ellipsoidal cylindrical conical`. Times count from the first sweep; a latency that is not known
-/// is −1. With `here`, a column of that name says which of them can be had.
+/// is −1. `tracks` (those believed in; −1 where they are not known) and `alerts` (those on alert). With `here`, a column of that name says which of them can be had.
 pub(crate) fn encode(rows: &[Row], here: Option<&[bool]>) -> std::io::Result<Vec<u8>> {
     let first_ns = rows.first().map_or(0, |row| row.sensor_time_ns);
     let mut columns = Columns::default();
@@ -23,6 +23,9 @@ pub(crate) fn encode(rows: &[Row], here: Option<&[bool]>) -> std::io::Result<Vec
     for (class, name) in classes.into_iter().enumerate() {
         columns.integers(name, rows.iter().map(|row| row.classes[class] as i32));
     }
+    let tracks = |row: &Row| row.tracks.map_or(-1, |(tracks, _)| tracks as i32);
+    columns.integers("tracks", rows.iter().map(tracks));
+    columns.integers("alerts", rows.iter().map(|row| row.tracks.map_or(0, |(_, alerts)| alerts as i32)));
     if let Some(here) = here {
         columns.integers("here", here.iter().map(|&here| here.into()));
     }

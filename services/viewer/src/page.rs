@@ -9,12 +9,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::recording::{Recording, Row};
+use crate::recording::Recording;
+use crate::row::Row;
 
 /// The page's parts, in the order in which they stand in it.
 const FRAME: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/style.css");
-const SCRIPTS: [&str; 15] = [
+const SCRIPTS: [&str; 17] = [
     include_str!("../page/decode.js"),
     include_str!("../page/store.js"),
     include_str!("../page/vector.js"),
@@ -27,6 +28,8 @@ const SCRIPTS: [&str; 15] = [
     include_str!("../page/overlay.js"),
     include_str!("../page/plots.js"),
     include_str!("../page/list.js"),
+    include_str!("../page/tracks.js"),
+    include_str!("../page/track_list.js"),
     include_str!("../page/controls.js"),
     include_str!("../page/live.js"),
     include_str!("../page/main.js"),
@@ -35,6 +38,9 @@ const SCRIPTS: [&str; 15] = [
 /// Colours of the classes in the order of `ObstacleClass::ALL`: those of Okabe and Ito that are told apart by all eyes and
 /// stand out on dark ground; a recording's other views have the same.
 const COLOURS: [&str; 5] = ["#56b4e9", "#e69f00", "#009e73", "#d55e00", "#bebebe"];
+
+/// Of tracks on alert.
+const ALERT: &str = "#ff00ff";
 
 /// What the page is told beside the sweeps.
 #[derive(Debug)]
@@ -147,6 +153,7 @@ fn told(about: &About) -> Value {
         "most_points": about.most_points,
         "served": about.served,
         "live": about.live,
+        "alert": ALERT,
         "steps": Step::ALL.map(Step::name),
         "classes": classes.map(|(class, colour)| json!({"number": *class as u8, "name": class.name(), "colour": colour}))
             .collect::<Vec<_>>(),

@@ -3,49 +3,22 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use mcap::records::Record;
-use messages::{Detections, Message, Raw, Sweep, Trace};
+use messages::{Detections, Message, Raw, Sweep, Trace, TrackTable};
 use zerocopy::FromZeros;
 
 use crate::ViewError;
-use crate::cloud;
+use crate::cloud::{self, Known};
+use crate::paths::Paths;
 use crate::records::{Records, Top, inner};
+use crate::row::{Row, Spot, read_found, read_sweep, read_tracks};
 
 const SWEEPS: &str = "/encke/raw/sweep";
 const DETECTIONS: &str = "/encke/raw/detections";
+const TRACKS: &str = "/encke/raw/tracks";
 /// Name of the metadata record that says what was recorded.
 const RUN: &str = "encke.run";
-/// Classes, `Unclassified` at 0.
-const CLASSES: usize = 5;
 /// Faults of a file that are told in full.
 const TOLD: usize = 8;
-
-/// Where a message lies: offset of its top-level record in the file, and its place among that record's messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Spot {
-    record: u64,
-    message: usize,
-}
-
-/// What is known of a sweep without drawing it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
-    /// Number of the sweep in its run.
-    pub sweep: u32,
-    /// Sensor time of its first firing [ns].
-    pub sensor_time_ns: u64,
-    /// Accepted returns; 0 where the recording lost the sweep.
-    pub returns: u32,
-    /// Obstacles by class, as `ObstacleClass` numbers them.
-    pub classes: [u32; CLASSES],
-    /// Last return to last detection [ns]; none where the recording lost the detections.
-    pub latency_ns: Option<u64>,
-    /// Number of the step of degradation at which it was made.
-    pub step: u32,
-    /// Whether the whole turn was seen.
-    pub complete: bool,
-    cloud: Option<Spot>,
-    found: Option<Spot>,
-}
 
 /// Which sweeps to show: `sweeps` from `first` on, every `every`-th.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,8 +45,10 @@ pub struct Recording {
     rows: Vec<Row>,
     run: BTreeMap<String, String>,
     damage: Vec<String>,
+    paths: Paths,
     sweep: Box<Sweep>,
     detections: Box<Detections>,
+    table: Box<TrackTable>,
 }
 
 /// What a channel carries.
@@ -81,6 +56,7 @@ pub struct Recording {
 enum Kind {
     Sweep,
     Detections,
+    Tracks,
 }
 
 impl Recording {
@@ -99,8 +75,10 @@ impl Recording {
             rows: Vec::new(),
             run: BTreeMap::new(),
             damage: Vec::new(),
+            paths: Paths::default(),
             sweep: Sweep::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
             detections: Detections::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
+            table: TrackTable::new_box_zeroed().map_err(|_| ViewError::NoMemory)?,
         };
         recording.look_through()?;
         Ok(recording)
@@ -146,18 +124,24 @@ impl Recording {
     pub fn encoded(&mut self, place: usize, most_points: usize) -> Result<Vec<u8>, ViewError> {
         let row = self.rows.get(place).cloned().unwrap_or_default();
         let changed = |cause: String| ViewError::Changed { path: self.path.clone(), sweep: row.sweep, cause };
-        for spot in [row.cloud, row.found].into_iter().flatten() {
+        for spot in [row.cloud, row.found, row.table].into_iter().flatten() {
             let bytes = message(&mut self.records, spot).map_err(changed)?;
             let read = if Some(spot) == row.cloud {
                 self.sweep.read_raw(&bytes)
-            } else {
+            } else if Some(spot) == row.found {
                 Trace::read_raw(&bytes).and_then(|(_, bytes)| self.detections.read_raw(bytes))
+            } else {
+                Trace::read_raw(&bytes).and_then(|(_, bytes)| self.table.read_raw(bytes))
             };
             read.map_err(|cause| changed(cause.to_string()))?;
         }
-        let sweep = row.cloud.map(|_| &*self.sweep);
-        let detections = row.found.map(|_| &*self.detections);
-        cloud::encode(sweep, detections, most_points).map_err(ViewError::Write)
+        let known = Known {
+            number: row.sweep,
+            sweep: row.cloud.map(|_| &*self.sweep),
+            detections: row.found.map(|_| &*self.detections),
+            tracks: row.table.map(|_| (&*self.table, &self.paths)),
+        };
+        cloud::encode(known, most_points).map_err(ViewError::Write)
     }
 
     fn look_through(&mut self) -> Result<(), ViewError> {
@@ -186,6 +170,13 @@ impl Recording {
                         let read = match (kind, row) {
                             (Some(Kind::Sweep), Some(row)) => read_sweep(&data, spot, &mut self.sweep, row),
                             (Some(Kind::Detections), Some(row)) => read_found(&data, spot, &mut self.detections, row),
+                            (Some(Kind::Tracks), Some(row)) => {
+                                let read = read_tracks(&data, spot, &mut self.table, row);
+                                if read.is_ok() && row.table.is_some() {
+                                    self.paths.note(header.sequence, &self.table);
+                                }
+                                read
+                            }
                             _ => Ok(()),
                         };
                         if let Err(cause) = read {
@@ -206,7 +197,7 @@ impl Recording {
     fn settle(&mut self, found: Found) -> Result<(), ViewError> {
         let path = self.path.clone();
         let rows = found.rows.into_iter().map(|(sweep, row)| Row { sweep, ..row });
-        self.rows = rows.filter(|row| row.cloud.is_some() || row.found.is_some()).collect();
+        self.rows = rows.filter(|row| row.cloud.or(row.found).or(row.table).is_some()).collect();
         if self.damage.len() > TOLD {
             let more = self.damage.len() - TOLD;
             self.damage.truncate(TOLD);
@@ -243,6 +234,7 @@ impl Found {
         let (kind, expected) = match channel.topic.as_str() {
             SWEEPS => (Kind::Sweep, Sweep::TYPE),
             DETECTIONS => (Kind::Detections, Detections::TYPE),
+            TRACKS => (Kind::Tracks, TrackTable::TYPE),
             _ => {
                 self.topics.insert(channel.topic);
                 return;
@@ -256,42 +248,6 @@ impl Found {
             }
         }
     }
-}
-
-fn read_sweep(bytes: &[u8], spot: Spot, sweep: &mut Sweep, row: &mut Row) -> Result<(), messages::RawError> {
-    sweep.read_raw(bytes)?;
-    note_sweep(sweep, row);
-    row.cloud = Some(spot);
-    Ok(())
-}
-
-fn read_found(bytes: &[u8], spot: Spot, found: &mut Detections, row: &mut Row) -> Result<(), messages::RawError> {
-    let (trace, bytes) = Trace::read_raw(bytes)?;
-    found.read_raw(bytes)?;
-    note_detections(&trace, found, row.cloud.is_some(), row);
-    row.found = Some(spot);
-    Ok(())
-}
-
-/// Puts down what is known of a whole sweep.
-pub(crate) fn note_sweep(sweep: &Sweep, row: &mut Row) {
-    row.sensor_time_ns = sweep.header.sensor_time_ns;
-    row.complete = sweep.header.is_complete();
-    row.returns = sweep.returns.len() as u32;
-}
-
-/// Puts down what was found in a whole sweep; what the sweep itself says of it where that is not known.
-pub(crate) fn note_detections(trace: &Trace, found: &Detections, has_sweep: bool, row: &mut Row) {
-    if !has_sweep {
-        row.sensor_time_ns = found.header.sensor_time_ns;
-        row.complete = found.header.is_complete();
-    }
-    row.classes = [0; CLASSES];
-    for detection in &found.detections {
-        row.classes[detection.class as usize] += 1;
-    }
-    row.latency_ns = trace.hops().last().map(|hop| hop.finished_ns.saturating_sub(trace.due_ns));
-    row.step = trace.part.step;
 }
 
 /// The bytes of a message.

@@ -7,7 +7,7 @@ mod support;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use lidar::ObstacleClass;
-use messages::{Detections, Message, Sweep, Truth};
+use messages::{Detections, Message, Sweep, Track, TrackState, TrackTable, Truth};
 use support::{RUN, Rooms, Writer, file, recorded, scene, trace};
 use tape::{About, Tape, TapeFile};
 use viewer::{Limits, Recording, Selection, ViewError, Written, write_page};
@@ -61,6 +61,7 @@ fn what_the_chain_s_tape_writes_is_shown() {
     let mut tape = Tape::start(settings, &path, about, None, 1).unwrap();
     let (mut simulator, mut rooms) = (scene(), Rooms::new());
     let (mut sweep, mut truth) = (Sweep::new_box_zeroed().unwrap(), Truth::new_box_zeroed().unwrap());
+    let mut table = TrackTable::new_box_zeroed().unwrap();
     let mut found = Vec::new();
     for number in 0..3 {
         sweep.clear();
@@ -70,16 +71,33 @@ fn what_the_chain_s_tape_writes_is_shown() {
         let trace = trace(number, 5_000_000 + number);
         tape.sweep(1, &trace, &sweep);
         tape.detections(1, &trace, &rooms.detections);
-        found.push((sweep.returns.len() as u32, rooms.detections.detections.len() as u32, Some(5_000_000 + number)));
+        table.clear();
+        // Of the first sweep the tracker cannot answer.
+        table.time_ns = number * 200_000_000;
+        for (id, state) in [(7, TrackState::Confirmed), (9, TrackState::Coasting), (8, TrackState::Tentative)] {
+            let position_m = [number as f32, 0.0, 0.0];
+            table.tracks.push(Track { id, state, position_m, alert: u8::from(id == 9), ..Track::default() }).unwrap();
+        }
+        tape.tracks(1, &trace, &table);
+        let tracks = (number > 0).then_some((2, 1));
+        let detections = rooms.detections.detections.len() as u32;
+        found.push((sweep.returns.len() as u32, detections, Some(5_000_000 + number), tracks));
     }
     tape.finish(1).unwrap();
     let mut recording = Recording::open(&path).unwrap();
     let rows = recording.rows().iter();
-    let read: Vec<_> = rows.map(|row| (row.returns, row.classes.iter().sum(), row.latency_ns)).collect();
+    let read: Vec<_> = rows.map(|row| (row.returns, row.classes.iter().sum(), row.latency_ns, row.tracks)).collect();
     assert_eq!(read, found);
     assert!(recording.damage().is_empty(), "{:?}", recording.damage());
     let (_, text) = page(&mut recording, Selection::default(), Limits::default());
     assert_eq!((&about_of(&text)["source"], &about_of(&text)["sensor"]), (&"default.toml".into(), &"hdl-32e".into()));
+}
+
+#[test]
+fn a_recording_without_tracks_is_shown_and_says_that_they_are_not_known() {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = Recording::open(&file(&dir, "run.mcap", &recorded(2))).unwrap();
+    assert!(recording.rows().iter().all(|row| row.tracks.is_none() && row.returns > 0));
 }
 
 #[test]
@@ -92,6 +110,8 @@ fn classes_have_the_colours_that_recordings_have_elsewhere() {
         assert_eq!(told["colour"], format!("#{red:02x}{green:02x}{blue:02x}"), "{}", class.name());
         assert_eq!(told["number"], *class as u8);
     }
+    let [red, green, blue] = tape::ALERT;
+    assert_eq!(about_of(&text)["alert"], format!("#{red:02x}{green:02x}{blue:02x}"));
 }
 
 #[test]
@@ -209,7 +229,7 @@ fn a_layout_of_another_encke_is_named() {
     writer.finish().unwrap();
     let dir = tempfile::tempdir().unwrap();
     let error = Recording::open(&file(&dir, "x.mcap", &writer.into_inner().into_inner())).err().unwrap();
-    assert!(error.to_string().contains("/encke/raw/sweep is encke.Sweep.1, must be encke.Sweep.2"), "{error}");
+    assert!(error.to_string().contains("/encke/raw/sweep is encke.Sweep.1, must be encke.Sweep.3"), "{error}");
 }
 
 #[test]

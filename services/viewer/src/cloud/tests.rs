@@ -29,10 +29,14 @@ fn messages() -> (Box<Sweep>, Box<Detections>) {
     (sweep, message)
 }
 
+fn both<'a>(sweep: &'a Sweep, detections: &'a Detections) -> Known<'a> {
+    Known { sweep: Some(sweep), detections: Some(detections), ..Known::default() }
+}
+
 #[test]
 fn what_is_embedded_decodes_to_the_same_returns_within_half_a_unit() {
     let (sweep, message) = messages();
-    let back = decode(&encode(Some(&sweep), Some(&message), usize::MAX).unwrap());
+    let back = decode(&encode(both(&sweep, &message), usize::MAX).unwrap());
     let order = [0, 2, 4, 6, 1, 3, 5, 7];
     for (at, place) in order.into_iter().enumerate() {
         let point = sweep.returns[place];
@@ -49,8 +53,8 @@ fn what_is_embedded_decodes_to_the_same_returns_within_half_a_unit() {
 #[test]
 fn clusters_and_solids_come_with_class_size_and_how_sure_they_are() {
     let (_, message) = messages();
-    let back = decode(&encode(None, Some(&message), usize::MAX).unwrap());
-    assert!(!back.contains_key("x"));
+    let back = decode(&encode(Known { detections: Some(&message), ..Known::default() }, usize::MAX).unwrap());
+    assert!(!back.contains_key("x") && !back.contains_key("t_low"));
     assert_eq!(back["class"], [3.0, 0.0]);
     assert_eq!(back["points"], [3.0, 1.0]);
     assert!((back["p2"][0] - 0.6).abs() < 1e-9);
@@ -62,7 +66,7 @@ fn clusters_and_solids_come_with_class_size_and_how_sure_they_are() {
 #[test]
 fn more_returns_than_wanted_are_thinned_evenly() {
     let (sweep, message) = messages();
-    let back = decode(&encode(Some(&sweep), Some(&message), 3).unwrap());
+    let back = decode(&encode(both(&sweep, &message), 3).unwrap());
     assert_eq!(back["intensity"], [200.0, 206.0, 205.0]);
     assert_eq!(back["points"], [3.0, 1.0], "clusters keep their own count");
 }
@@ -72,7 +76,14 @@ fn places_that_are_none_are_left_out() {
     let (sweep, mut message) = messages();
     message.detections[0].summary.first_member = u32::MAX;
     message.detections[0].first_solid = 7;
-    let back = decode(&encode(Some(&sweep), Some(&message), usize::MAX).unwrap());
+    let back = decode(&encode(both(&sweep, &message), usize::MAX).unwrap());
     assert!(back["of"].is_empty());
     assert_eq!(back["cluster"].iter().filter(|&&cluster| cluster >= 0.0).count(), 1);
+}
+
+#[test]
+fn a_sweep_whose_tracks_are_known_to_be_none_is_told_from_one_whose_tracks_are_not_known() {
+    let table = TrackTable::new_box_zeroed().unwrap();
+    let known = Known { tracks: Some((&table, &Paths::default())), ..Known::default() };
+    assert_eq!(decode(&encode(known, usize::MAX).unwrap())["t_low"], [0.0; 0]);
 }
