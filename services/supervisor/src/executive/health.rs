@@ -67,7 +67,8 @@ impl Patient {
         (times, health): (&Times, &HealthFile),
     ) -> Option<Change> {
         if signs.told {
-            *self = Self { processes: signs.processes, ..Self::default() };
+            // The process after the one that was told is no sign of a death.
+            *self = Self { processes: signs.processes + 1, ..Self::default() };
             return None;
         }
         if !signs.up {

@@ -312,6 +312,14 @@ fn who_is_not_up_yet_or_was_told_to_leave_is_not_judged() {
     bed.signs = Signs { told: true, up: false, ..bed.signs };
     bed.pass(5_000, |_, _| ());
     assert_eq!(bed.said(), [], "told to leave");
+    bed.signs = Signs { told: false, starts: true, processes: 2, ..bed.signs };
+    bed.pass(100, |_, _| ());
+    bed.signs = Signs { up: true, starts: false, life: 2, ..bed.signs };
+    bed.work(500);
+    assert_eq!(bed.said(), [], "and started again");
+    bed.signs = Signs { up: false, processes: 3, ..bed.signs };
+    bed.pass(5, |_, _| ());
+    assert_eq!(bed.said(), [Condition::Dead]);
 }
 
 #[test]
