@@ -49,7 +49,11 @@ impl Watch<'_> {
         if !self.stages[position].is_alive() {
             return Ok(());
         }
+        let torn = self.renewing && self.is_sink(position) && self.is_torn();
         self.stages[position].tell();
+        if torn {
+            self.stages[position].kill();
+        }
         let end_ns = clock::now_ns() + LEAVE_PATIENCE_NS;
         while self.stages[position].is_alive() {
             if clock::now_ns() > end_ns {

@@ -318,7 +318,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether the sink has answered all that was sent, however often.
-    fn is_answered(&self) -> bool {
+    pub(crate) fn is_answered(&self) -> bool {
         let (Some(source), Some(sink)) = (self.stages.first(), self.stages.last()) else { return true };
         sink.page.next_ordinal_out.get() >= source.page.next_ordinal_out.get()
     }
@@ -376,7 +376,9 @@ impl<'a> Watch<'a> {
         self.look_at_tape()?;
         self.listen();
         self.climb();
-        self.look_at_mode();
+        if !self.renewing {
+            self.look_at_mode();
+        }
         let now_ns = clock::now_ns();
         if now_ns >= self.next_sample_ns {
             self.next_sample_ns = now_ns + SAMPLE_NS;

@@ -33,7 +33,7 @@ impl Watch<'_> {
         }
         let source = &self.stages[0].page;
         source.step.set(self.modes.step() as u64);
-        source.pause.set(u64::from(self.modes.is_paused()));
+        source.pause.set(u64::from(self.modes.is_paused() || self.renewing));
     }
 
     /// Goes on in the mode, and with the tiers, that the pages say, where one supervisor follows another. The step at which the

@@ -140,8 +140,12 @@ impl Watch<'_> {
     /// Tells the tape to leave, when nothing more will come, and waits until it has written what it has.
     pub(crate) fn end_tape(&mut self) -> Result<(), SupervisorError> {
         const LEAVE_PATIENCE: Duration = Duration::from_secs(10);
+        let torn = self.renewing && self.is_torn();
         let Some(tape) = &mut self.tape else { return Ok(()) };
         tape.process.tell();
+        if torn {
+            tape.process.kill();
+        }
         let end_ns = clock::now_ns() + LEAVE_PATIENCE.as_nanos() as u64;
         while self.tape.as_ref().is_some_and(|tape| tape.process.is_alive()) {
             if clock::now_ns() > end_ns {

@@ -3,14 +3,18 @@
 
 use chain::SUPERVISOR;
 use events::{CHAIN, EventId};
-use runtime::clock;
 use runtime::realtime::AsBefore;
+use runtime::{Pace, clock};
 use transport::Node;
 
 use crate::SupervisorError;
 use crate::house::services::Services;
+use crate::processes::child::Watched;
 use crate::restarts::shared_memory::SharedMemory;
 use crate::watch::Watch;
+
+/// How long the source may take to stand still, and all that it has sent to come through [ns].
+const STILL_NS: u64 = 2_000_000_000;
 
 impl Watch<'_> {
     /// Files of the chain in shared memory were deleted: all processes are to be restarted with new ones, within the chain's
@@ -62,6 +66,7 @@ impl Watch<'_> {
     }
 
     fn renew_shared_memory(&mut self) -> Result<(), SupervisorError> {
+        self.stand_still()?;
         self.stop_in_order()?;
         if self.is_ending() {
             return Ok(());
@@ -74,6 +79,26 @@ impl Watch<'_> {
         self.instance.remove_from_shared_memory(&of_before)?;
         self.shared_memory = SharedMemory::default();
         self.start_all_again()
+    }
+
+    /// Lets the source stand still between two sweeps, and what it has sent come through, so that no sweep is torn. Where a stage
+    /// is gone that does not come, and nobody waits for it.
+    fn stand_still(&mut self) -> Result<(), SupervisorError> {
+        self.stages[0].page.pause.set(1);
+        let end_ns = clock::now_ns() + STILL_NS;
+        while !self.is_ending() && clock::now_ns() < end_ns && self.stages.iter().all(Watched::is_up) {
+            let is_still = self.stages[0].page.paused.get() > 0;
+            if is_still && (1..self.stages.len()).all(|position| self.is_drained(position)) && !self.is_torn() {
+                break;
+            }
+            self.look_once()?;
+        }
+        Ok(())
+    }
+
+    /// Whether sweeps that were sent would be sent again. A sink that left in order would write what it has of them.
+    pub(crate) fn is_torn(&self) -> bool {
+        self.plan.pace == Pace::Fast && !(self.is_answered() && self.is_on_tape())
     }
 
     /// As at the start: readers before writers, the source when all others are connected. Who was given up stays away.
@@ -92,6 +117,7 @@ impl Watch<'_> {
         if self.is_ending() {
             return Ok(());
         }
+        self.stages[0].page.pause.set(u64::from(self.modes.is_paused()));
         self.start_again(0)?;
         self.await_up(0)
     }

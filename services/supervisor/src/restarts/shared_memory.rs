@@ -67,7 +67,12 @@ impl Watch<'_> {
     pub(crate) fn look_for_files(&mut self, now_ns: u64) {
         let is_leaving = |(stage, lives): (&Watched, &Lives)| stage.told && !lives.is_given_up();
         let leave = self.stop_asked || self.failed.is_some() || self.stages.iter().zip(&self.lives).any(is_leaving);
-        if !self.begun || leave || self.shared_memory.is_to_be_renewed || !self.shared_memory.is_due(now_ns) {
+        if !self.begun
+            || self.renewing
+            || leave
+            || self.shared_memory.is_to_be_renewed
+            || !self.shared_memory.is_due(now_ns)
+        {
             return;
         }
         let beside = self.tape.iter().map(|tape| &tape.process);
