@@ -20,7 +20,8 @@ pub struct Solid {
     /// Full extents along the body's axes [m]; cylinder and cone along z: diameter, diameter, height; a cone's apex is up.
     pub size_m: [f32; 3],
     /// Covariance of centre [m], turn [rad] (a small rotation after the attitude, about the sensor's axes) and size [m]:
-    /// the upper triangle, row by row. What rays do not tell is as wide as the fit's beliefs: 5 m, π/√3.
+    /// the upper triangle, row by row. About this body, of the truth: by ranges, by the rays that passed beside, by what may
+    /// lie behind, by other minima. What none of these tells is as wide as the fit's beliefs: 5 m, π/√3.
     pub covariance: [f32; SOLID_PARAMETERS * (SOLID_PARAMETERS + 1) / 2],
 }
 

@@ -95,6 +95,7 @@ impl UnitSolid for Cone {
             distance_m: pick(arc, off_m, base, line),
             normal,
             point_m: (by_arc | by_base).choose_vector(foot, by_tip.choose_vector(tip, on_line)),
+            along: zero,
         }
     }
 

@@ -69,9 +69,10 @@ impl UnitSolid for Cuboid {
         let half_edge_m = y.choose(half_m[1], z.choose(half_m[2], half_m[0]));
         let level = y.choose(offset[1], z.choose(offset[2], offset[0]));
         let there = (level - dot(offset, direction) * lean) / (all(1.0) - lean * lean).max(all(1e-12));
+        let share = there / half_edge_m;
         let there = there.clamp(-half_edge_m, half_edge_m);
         let point_m = [x.choose(there, middle_m[0]), y.choose(there, middle_m[1]), z.choose(there, middle_m[2])];
-        Passing { distance_m, normal, point_m }
+        Passing { distance_m, normal, point_m, along: share }
     }
 
     fn bounding_radius(half_m: &Vector3<f64>) -> f64 {

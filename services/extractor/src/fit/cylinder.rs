@@ -69,6 +69,7 @@ impl UnitSolid for Cylinder {
             distance_m: by_side.choose(side, between.choose(cap, arc)),
             normal,
             point_m: Upright::on_rim(normal, radius_m, by_side.choose(z_m, half_height_m * end)),
+            along: zero,
         }
     }
 

@@ -40,6 +40,7 @@ impl UnitSolid for Ellipsoid {
             distance_m: level * (level - all(1.0)) / steepness,
             normal: shrink(slope, steepness),
             point_m: shrink(times(nearest, half_m), level),
+            along: all(0.0),
         };
         let central = level.less(all(1e-9)) | steepness.less(all(1e-12));
         if central.any() {
@@ -53,6 +54,7 @@ impl UnitSolid for Ellipsoid {
                 distance_m: central.choose(-least_m, passing.distance_m),
                 normal: central.choose_vector(normal, passing.normal),
                 point_m: central.choose_vector(scale(normal, least_m), passing.point_m),
+                along: passing.along,
             };
         }
         passing

@@ -2,12 +2,15 @@ use messages::Fit;
 use nalgebra::{Matrix3, Vector3};
 use pulp::Arch;
 
+use super::bounds::Bounds;
 use super::budget::Purse;
 use super::descent::Descent;
 use super::frames::{FRAMES, Frames, TURNED, turned};
 use super::outcome::solid_fit;
 use super::rays::{Beam, thin};
 use super::residuals::{Measure, Rays};
+use super::solid::for_kind;
+use super::spread::spread;
 use super::start::Cloud;
 use super::{Beliefs, Body, Bundle, FitSettings, Kind, Ray};
 
@@ -52,6 +55,7 @@ pub struct Fitter {
     full: Picked,
     axes: Vec<Vector3<f64>>,
     descents: Vec<Descent>,
+    bounds: Bounds,
 }
 
 /// Rays that were chosen from a bundle.
@@ -98,6 +102,7 @@ impl Fitter {
             full: Picked::new(settings.rays),
             axes: Vec::with_capacity(3 * FRAMES),
             descents: Vec::with_capacity(MOST_STARTS),
+            bounds: Bounds::new(2 * settings.rays),
         }
     }
 
@@ -125,11 +130,17 @@ impl Fitter {
         self.scout(&frames, sigma_m, &mut purse);
         self.polish(sigma_m, &mut purse);
 
+        let rays = self.full.rays(self.arch, sigma_m, &self.settings.beliefs);
+        let least = self.descents[0].cost();
         for kind in Kind::ALL {
-            let mut of_kind = self.descents.iter().filter(|descent| descent.kind == kind);
+            let of_kind = || self.descents.iter().filter(|descent| descent.kind == kind);
+            let others = || of_kind().skip(1);
             // Every solid has a start.
-            let Some(best) = of_kind.next() else { continue };
-            fit.solids[kind as usize] = solid_fit(best, of_kind.next());
+            let Some(best) = of_kind().next() else { continue };
+            // One farther behind was not followed to its minimum.
+            let bounds = Some(&mut self.bounds).filter(|_| best.cost() <= least + BEHIND_ALL);
+            let spread = bounds.and_then(|bounds| for_kind!(kind, S => spread::<S>(best, others(), &rays, bounds)));
+            fit.solids[kind as usize] = solid_fit(best, others().next(), spread);
         }
         fit.hits = self.full.hits.len() as u32;
         fit.misses = self.full.misses.len() as u32;

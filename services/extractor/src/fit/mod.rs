@@ -4,8 +4,10 @@
 //! ([`residuals`]), ray by ray ([`sight`]) but many at once ([`wide`]). Each solid knows, in a file of its own, where a ray
 //! meets it and how a ray passes it; the derivatives are the same for all ([`solid`]). [`Fitter`] looks for the best body of
 //! each solid: from several starts ([`frames`], [`start`]) by Levenberg's and Marquardt's method ([`descent`]), on a budget
-//! ([`budget`]).
+//! ([`budget`]); how far the truth may be off follows from ranges, outline and other minima ([`spread`], [`outline`],
+//! [`bounds`]).
 
+mod bounds;
 mod budget;
 mod cone;
 mod cuboid;
@@ -15,12 +17,14 @@ mod ellipsoid;
 mod fitter;
 mod frames;
 mod outcome;
+mod outline;
 mod rays;
 mod residuals;
 mod settings;
 mod sight;
 mod silhouette;
 mod solid;
+mod spread;
 mod start;
 mod system;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 use messages::{SOLID_PARAMETERS, Solid, SolidFit};
 use nalgebra::{Matrix3, Rotation3, SMatrix, UnitQuaternion};
 
+use super::bounds::Square;
 use super::descent::Descent;
 use super::system::{MOST, decompose, parameters, solve};
 
@@ -11,13 +12,14 @@ const ANY_TURN_RAD: f64 = 1.813_799_364_234_217_8;
 /// Most that a message says of how far the next minimum is behind.
 const FAR_BEHIND: f64 = 100.0;
 
-/// What a fit says of one solid, from its best descent and the next best.
-pub(crate) fn solid_fit(best: &Descent, next: Option<&Descent>) -> SolidFit {
-    let round = best.kind.is_round();
-    let (covariance, ln_information) = covariance(&best.system.curvature, round);
+/// What a fit says of one solid, from its best descent and the next best; `spread` is the covariance of the best's
+/// parameters, in place of Gauss's and Newton's.
+pub(crate) fn solid_fit(best: &Descent, next: Option<&Descent>, spread: Option<Square>) -> SolidFit {
+    let (covariance, ln_information) =
+        inverse(&best.system.curvature, best.kind.is_round()).unwrap_or((Square::zeros(), 0.0));
     let behind = next.map_or(FAR_BEHIND, |next| next.cost() - best.cost());
     SolidFit {
-        solid: solid(best, &covariance),
+        solid: solid(best, &spread.unwrap_or(covariance)),
         hit_cost: best.parts.hits as f32,
         miss_cost: best.parts.misses as f32,
         belief_cost: best.parts.beliefs as f32,
@@ -29,8 +31,8 @@ pub(crate) fn solid_fit(best: &Descent, next: Option<&Descent>) -> SolidFit {
 }
 
 /// Inverse of the information of the fit's parameters, in their own order, and ln of the information's determinant. To
-/// the rays' information comes what is known without: [`FAR_M`], [`ANY_TURN_RAD`].
-fn covariance(curvature: &[[f64; MOST]; MOST], round: bool) -> (SMatrix<f64, MOST, MOST>, f64) {
+/// the rays' information comes what is known without: [`FAR_M`], [`ANY_TURN_RAD`]. None where it is not positive definite.
+pub(crate) fn inverse(curvature: &[[f64; MOST]; MOST], round: bool) -> Option<(Square, f64)> {
     let count = parameters(round);
     let turns = 3..if round { 5 } else { 6 };
     let mut factor = *curvature;
@@ -41,11 +43,9 @@ fn covariance(curvature: &[[f64; MOST]; MOST], round: bool) -> (SMatrix<f64, MOS
             row[i] += ANY_TURN_RAD.powi(-2);
         }
     }
-    let mut inverse = SMatrix::zeros();
-    if decompose(&mut factor, count).is_none() {
-        return (inverse, 0.0);
-    }
+    decompose(&mut factor, count)?;
     let ln_information = (0..count).map(|i| 2.0 * factor[i][i].ln()).sum();
+    let mut inverse = Square::zeros();
     for column in 0..count {
         let mut x = [0.0; MOST];
         x[column] = 1.0;
@@ -54,10 +54,10 @@ fn covariance(curvature: &[[f64; MOST]; MOST], round: bool) -> (SMatrix<f64, MOS
             inverse[(row, column)] = x[row];
         }
     }
-    (inverse, ln_information)
+    Some((inverse, ln_information))
 }
 
-fn solid(descent: &Descent, covariance: &SMatrix<f64, MOST, MOST>) -> Solid {
+fn solid(descent: &Descent, covariance: &Square) -> Solid {
     let body = &descent.body;
     let size_m = body.ln_half.map(|ln_half| 2.0 * ln_half.exp());
     let attitude = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(body.rotation));

@@ -6,7 +6,7 @@ use pulp::Simd;
 use super::rays::MOST_LANES;
 use super::residuals::Measure;
 use super::system::Row;
-use super::wide::{Which, Wide, WideVector, along, cross, dot, norm, opposite, plus, scale, shrink, times};
+use super::wide::{Which, Wide, WideVector, along, cross, dot, minus, norm, opposite, plus, scale, shrink, times};
 use super::{Body, UnitSolid};
 
 /// Least |cosine| between a ray and a normal in a derivative: a grazing ray's range would jump with every step.
@@ -21,6 +21,9 @@ const IN_THE_WAY: f64 = 0.5;
 pub(crate) const BEFORE: f64 = 3.0;
 /// Residual from which on it is softened.
 const SOFT: f64 = 4.0;
+
+/// Share of an edge, about its middle, that a ray beside it bounds: at the ends the body could grow past the ray.
+const WITHIN: f64 = 0.9;
 
 /// The sensor as the body sees it.
 pub(crate) struct Sight<S: Simd> {
@@ -207,6 +210,22 @@ pub(crate) fn miss<K: UnitSolid, S: Simd>(
     };
     let residuals = Residuals { residual, factor: per_m * slope, normal: passing.normal, point: passing.point_m };
     Some((violated, residuals))
+}
+
+/// How far rays pass outside the body's outline [m], with derivatives of the outline's own movement towards them, and which
+/// of them would have met it there: those that end behind it, and not off the end of an edge, where another one bounds.
+#[inline(always)]
+pub(crate) fn beside<K: UnitSolid, S: Simd>(
+    sight: &Sight<S>,
+    rays: (WideVector<S>, Wide<S>),
+) -> (Which<S>, Residuals<S>) {
+    let (direction, range_m) = rays;
+    let (direction, _) = sight.directions(direction);
+    let passing = K::pass(sight.half_m, sight.origin, direction);
+    let there_m = dot(minus(passing.point_m, sight.origin), direction);
+    let tells = there_m.less(range_m) & passing.along.abs().at_most(sight.all(WITHIN));
+    let (normal, point) = (passing.normal, passing.point_m);
+    (tells, Residuals { residual: passing.distance_m, factor: sight.all(1.0), normal, point })
 }
 
 /// Residuals whose size grows with their logarithm only beyond [`SOFT`], and the slopes. A logarithm takes long: rays that

@@ -18,6 +18,8 @@ pub(crate) struct Passing<S: Simd> {
     pub(crate) normal: WideVector<S>,
     /// The point of the body that is seen there [m], body frame.
     pub(crate) point_m: WideVector<S>,
+    /// Of a cuboid: where the ray passes the edge's line, -1 and 1 at the ends; 0 of an outline without corners.
+    pub(crate) along: Wide<S>,
 }
 
 /// A view across the ray of a body that is round about z: x level, y as near upright as can be.

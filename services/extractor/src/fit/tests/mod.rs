@@ -1,6 +1,7 @@
 //! Bodies, rays and oracles for the tests of the fit.
 
 mod fits;
+mod honest;
 mod meeting;
 mod passing;
 mod recovery;

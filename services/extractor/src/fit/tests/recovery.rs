@@ -92,7 +92,7 @@ fn normalised_errors(kind: Kind, stand: &mut Stand, random: &mut ChaCha8Rng) -> 
 
 // verifies EXT-018
 #[test]
-fn centres_err_no_more_than_their_covariances_say() {
+fn centres_err_as_much_as_their_covariances_say() {
     let mut random = random(42);
     let mut stand = Stand::new(SIGMA_M);
     for kind in Kind::ALL {
@@ -101,8 +101,6 @@ fn centres_err_no_more_than_their_covariances_say() {
         println!("{kind:?}: mean {mean:.2}, median {:.3}, 90 % under {:.2}, {:.2}", errors[50], errors[90], errors[99]);
         // χ² of 3 degrees: median 0.79, 90 % under 2.08. A few in a hundred lie in another minimum.
         assert!(errors[50] < 1.2 && errors[90] < 4.0, "{kind:?}: {} {}", errors[50], errors[90]);
-        // Edges between rays tell Gauss's and Newton's matrix nothing: those of cuboids are known far better than said.
-        let least = if kind == Kind::Cuboid { 0.0 } else { 0.2 };
-        assert!(errors[50] > least, "{kind:?}: {}", errors[50]);
+        assert!(errors[50] > 0.2, "{kind:?}: {}", errors[50]);
     }
 }

@@ -1,4 +1,4 @@
-//! One body before a simulated sensor.
+//! One body before a simulated sensor, or a scene of many.
 
 use messages::{Clusters, Part, Sweep, Truth, Verdict};
 use simulator::{Motion, Obstacle, SceneFile, Shape, Simulator};
@@ -31,10 +31,9 @@ impl Stand {
         .unwrap();
         let sensor: lidar::SensorFile = toml::from_str(SENSOR).unwrap();
         let scene = file.checked(&sensor.checked().unwrap(), &std::collections::BTreeMap::new()).unwrap();
-        let params = clusterer::Params { range_d_m: 1.0, method: clusterer::Method::Auto, min_points: 5 };
         Self {
             simulator: Simulator::new(scene),
-            clusterer: clusterer::Clusterer::init(params).unwrap(),
+            clusterer: clusterer(),
             sweep: Sweep::new_box_zeroed().unwrap(),
             truth: Truth::new_box_zeroed().unwrap(),
             clusters: Clusters::new_box_zeroed().unwrap(),
@@ -68,4 +67,82 @@ impl Stand {
         self.bundle.take(&self.clusters, cluster, returns);
         Some(&self.bundle)
     }
+}
+
+/// A scene of `config/scenes/reference-tumbling.toml`, with a seed of its own, and the clusterer behind it.
+pub(crate) struct Field {
+    simulator: Simulator,
+    clusterer: clusterer::Clusterer,
+    sweep: Box<Sweep>,
+    truth: Box<Truth>,
+    clusters: Box<Clusters>,
+    bundle: Bundle,
+}
+
+/// A cluster of a scene, nine in ten of whose returns lie on one body.
+pub(crate) struct Known<'a> {
+    pub(crate) kind: Kind,
+    /// The body when its last return was taken.
+    pub(crate) body: Body,
+    pub(crate) points: usize,
+    pub(crate) rays: &'a Bundle,
+}
+
+impl Field {
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut file: SceneFile =
+            toml::from_str(include_str!("../../../../../config/scenes/reference-tumbling.toml")).unwrap();
+        file.seed = seed;
+        let sensor: lidar::SensorFile =
+            toml::from_str(include_str!("../../../../../config/sensors/hdl-32e-paper.toml")).unwrap();
+        let scene = file.checked(&sensor.checked().unwrap(), &std::collections::BTreeMap::new()).unwrap();
+        Self {
+            simulator: Simulator::new(scene),
+            clusterer: clusterer(),
+            sweep: Sweep::new_box_zeroed().unwrap(),
+            truth: Truth::new_box_zeroed().unwrap(),
+            clusters: Clusters::new_box_zeroed().unwrap(),
+            bundle: Bundle::new(lidar::MAX_RETURNS, messages::MAX_CELLS),
+        }
+    }
+
+    /// Shows each cluster of a sweep that can be fitted, with what it is of.
+    pub(crate) fn show(&mut self, sweep: u64, mut to: impl FnMut(&Known<'_>)) {
+        self.simulator.sweep(sweep, &mut self.sweep, &mut self.truth);
+        messages::Message::clear(&mut *self.clusters);
+        let part = Part { sectors: 1, ..Part::default() };
+        assert_eq!(self.clusterer.process(part, &self.sweep, &mut self.clusters), Verdict::Complete);
+        for cluster in &self.clusters.clusters {
+            let places = cluster.summary.member_places();
+            let owners =
+                || self.clusters.members[places.clone()].iter().map(|&member| self.truth.owners[member as usize]);
+            let owner = owners().next().unwrap();
+            let own = owners().filter(|&other| other == owner).count();
+            let points = places.len();
+            if points < messages::MIN_FEATURE_POINTS || own * 10 < points * 9 {
+                continue;
+            }
+            self.bundle.take(&self.clusters, cluster, &self.clusters.returns[places.clone()]);
+            let object = self.truth.objects[usize::from(owner)];
+            let body = body_of(&object, f64::from(cluster.summary.last_offset_ns) * 1e-9);
+            to(&Known { kind: Kind::ALL[object.kind as usize], body, points, rays: &self.bundle });
+        }
+    }
+}
+
+/// An obstacle so long after its sweep began.
+fn body_of(object: &messages::TruthObject, after_s: f64) -> Body {
+    let vector = |components: [f32; 3]| V::from(components.map(f64::from));
+    let [w, i, j, k] = object.attitude_wxyz.map(f64::from);
+    let attitude = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k));
+    Body {
+        centre_m: vector(object.centre_m) + vector(object.velocity_mps) * after_s,
+        rotation: (Rotation3::new(vector(object.spin_radps) * after_s) * attitude.to_rotation_matrix()).into_inner(),
+        ln_half: vector(object.size_m).map(|size_m| (0.5 * size_m).ln()),
+    }
+}
+
+fn clusterer() -> clusterer::Clusterer {
+    let params = clusterer::Params { range_d_m: 1.0, method: clusterer::Method::Auto, min_points: 5 };
+    clusterer::Clusterer::init(params).unwrap()
 }
