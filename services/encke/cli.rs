@@ -45,7 +45,8 @@ pub(crate) enum Command {
     /// Train the paper's classifiers on simulated obstacles.
     #[command(after_help = "Example:\n  encke train --plan config/training/paper.toml --out config/models")]
     Train(TrainArgs),
-    /// Measure the chain's classifier against its bars; exit 1 where one falls short. Or repeat the paper's experiments.
+    /// Measure the chain's classifier, or its tracker, against bars; exit 1 where one falls short. Or repeat the paper's
+    /// experiments.
     #[command(after_help = EVALUATE_NOTES)]
     Evaluate(EvaluateArgs),
     /// Time each stage's work on one sweep, without processes, on one thread.
@@ -273,11 +274,14 @@ pub(crate) struct EvaluateArgs {
     /// Repeat the paper's experiments instead.
     #[arg(long, requires = "out", conflicts_with_all = ["from", "format", "sensor", "chain"])]
     pub(crate) paper: bool,
-    /// What to look at, and the targets. [default: config/evaluation/reference.toml; with --paper
-    /// config/training/paper.toml]
+    /// Score the chain's tracks instead, on scenes in motion; with --from say what can be said of a recording's.
+    #[arg(long, conflicts_with = "paper")]
+    pub(crate) tracks: bool,
+    /// What to look at, and the targets. [default: config/evaluation/reference.toml; with --tracks
+    /// config/evaluation/tracks.toml; with --paper config/training/paper.toml]
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) plan: Option<PathBuf>,
-    /// Folder for evaluate.json and evaluate.html, or paper.json and paper.html.
+    /// Folder for evaluate.json and evaluate.html; or tracks.json and tracks.html; or paper.json and paper.html.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the JSON.

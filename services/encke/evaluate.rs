@@ -1,7 +1,9 @@
-//! `encke evaluate`: the configured classifier against its bars, or the paper's experiments.
+//! `encke evaluate`: the configured classifier against its bars, the configured tracker against its own, or the paper's
+//! experiments.
 
 mod bars;
 mod paper;
+mod tracks;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +16,11 @@ use crate::cli::EvaluateArgs;
 /// Measures, prints, and writes a page.
 pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     runtime::logging::install("warn");
-    if args.paper { paper::evaluate(args) } else { bars::evaluate(args) }
+    match (args.paper, args.tracks) {
+        (true, _) => paper::evaluate(args),
+        (false, true) => tracks::evaluate(args),
+        (false, false) => bars::evaluate(args),
+    }
 }
 
 /// A folder that can be written to: known before minutes of work.

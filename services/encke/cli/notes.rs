@@ -19,13 +19,16 @@ pub(super) const SIMULATE_EXAMPLES: &str = "Examples:
 pub(super) const EVALUATE_NOTES: &str = "\
 Simulated scenes that nothing was trained on go through clusterer, extractor and the classifier,
 as configured. What is looked at, and the targets: config/evaluation/reference.toml; what each
-bar measures: services/ground/README.md.
+bar measures: services/ground/README.md. --tracks does the same for the tracker behind them, on
+scenes in motion: config/evaluation/tracks.toml.
 Exit codes: 0 all bars hold, 1 one falls short, 2 cannot start.
 
 Examples:
   encke evaluate                                   the bars as a table
   encke evaluate --out report/                     with plots: report/evaluate.html
   encke evaluate --from capture.pcap               and how much is claimed of a recording
+  encke evaluate --tracks --out report/            tracks against truth: report/tracks.html
+  encke evaluate --tracks --from capture.pcap      what can be said of tracks without truth
   encke evaluate --paper --out report/             the paper's tables and figures: report/paper.html";
 
 pub(super) const BENCH_NOTES: &str = "Stages, each on what those before it left:

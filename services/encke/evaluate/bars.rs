@@ -4,6 +4,7 @@ use classifier::Classifier;
 use ground::{Claims, EvaluateError, Evaluation, EvaluationNote, EvaluationPlan};
 use messages::{Descriptors, Detections, Part};
 use runtime::{Plan, clock};
+use serde::de::DeserializeOwned;
 use stage::Stage;
 
 use super::{Out, run_note};
@@ -16,13 +17,15 @@ use crate::{Failure, dispatch, run};
 const PLAN: &str = "config/evaluation/reference.toml";
 
 /// Every sweep is whole.
-const PART: Part = Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
+pub(super) const PART: Part =
+    Part { ordinal: 0, sweep: 0, sector: 0, sectors: 1, sensor_time_ns: 0, step: 0, attempt: 0 };
 
 /// Measures the chain's classifier, prints its bars, and writes `evaluate.json` and `evaluate.html`.
 pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     let assets = Assets::beside(args.chain.as_deref());
     let path = args.plan.as_deref().unwrap_or(Path::new(PLAN));
-    let plan = plan(path, &assets)?;
+    let plan: EvaluationPlan = plan_in(path, &assets)?;
+    plan.check().map_err(|cause| Failure::start(format!("{}: {cause}", path.display())))?;
     let chain = run::plan(&as_run(args), &assets)?;
     let classifier = dispatch::init::<Classifier>(&chain, |params| dispatch::add_model(&chain, &assets, params))?;
     let recording = args.from.is_some().then(|| sources::open(&chain.source, &assets)).transpose()?;
@@ -75,7 +78,7 @@ pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
 }
 
 /// The plan in this file; where there is none, the one of this name that is built in.
-fn plan(path: &Path, assets: &Assets) -> Result<EvaluationPlan, Failure> {
+pub(super) fn plan_in<P: DeserializeOwned>(path: &Path, assets: &Assets) -> Result<P, Failure> {
     let named =
         |cause: &dyn std::fmt::Display| Failure::start(format!("{}: {}", path.display(), cause.to_string().trim_end()));
     let text = match std::fs::read_to_string(path) {
@@ -85,13 +88,11 @@ fn plan(path: &Path, assets: &Assets) -> Result<EvaluationPlan, Failure> {
             assets.text(&in_config.to_string_lossy()).map_err(Failure::start)?
         }
     };
-    let plan: EvaluationPlan = toml::from_str(&text).map_err(|cause| named(&cause))?;
-    plan.check().map_err(|cause| named(&cause))?;
-    Ok(plan)
+    toml::from_str(&text).map_err(|cause| named(&cause))
 }
 
 /// The run that would read the same recording with the same files.
-fn as_run(args: &EvaluateArgs) -> RunArgs {
+pub(super) fn as_run(args: &EvaluateArgs) -> RunArgs {
     RunArgs {
         chain: args.chain.clone(),
         from: args.from.clone(),
@@ -102,7 +103,7 @@ fn as_run(args: &EvaluateArgs) -> RunArgs {
 }
 
 /// Method and model of the chain's classifier.
-fn described(chain: &Plan) -> Result<String, Failure> {
+pub(super) fn described(chain: &Plan) -> Result<String, Failure> {
     let params = dispatch::params::<Classifier>(chain)?;
     Ok(format!("{}, {}", params.method.name(), params.model))
 }
