@@ -10,6 +10,7 @@ mod clear_mot;
 mod confirming;
 mod consistency;
 mod cost;
+mod courses;
 mod encounters;
 mod errors;
 mod frame;
