@@ -1,0 +1,198 @@
+use messages::Detection;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::class::Belief;
+use crate::filter::{Filter, Motion};
+use crate::frame::seconds;
+use crate::lifecycle::Life;
+use crate::measurement::{AxisOrder, Kind, as_foreign, axis_order, blur, of_centroid, of_solid};
+use crate::params::Params;
+use crate::sighting::Sighting;
+use crate::tracking::Sweep;
+
+/// Standard deviation of a place before it is measured [m]: wider than any fit's.
+const ANYWHERE_M: f64 = 30.0;
+/// Half extents that are reckoned with [m].
+const HALF_M: [f64; 2] = [0.05, 25.0];
+
+/// An obstacle through time.
+#[derive(Clone, Debug)]
+pub(crate) struct Tracked {
+    pub(crate) id: u64,
+    pub(crate) life: Life,
+    pub(crate) belief: Belief,
+    pub(crate) filter: Filter,
+    /// Sensor time of the filter's state: that of the last measurement [ns].
+    pub(crate) filter_ns: u64,
+    /// Sensor time at which it was last seen, measured or not [ns].
+    pub(crate) seen_ns: u64,
+    /// Whose error the filter reckons with.
+    kind: Kind,
+    /// The last solid that was fitted.
+    pub(crate) solid: Option<Attitude>,
+}
+
+/// How the last solid lay.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attitude {
+    /// Rotation from body to the tracks' frame.
+    pub(crate) attitude: UnitQuaternion<f64>,
+    /// Which body axis has which of the extents.
+    pub(crate) order: AxisOrder,
+}
+
+impl Tracked {
+    /// A new track, seen for the first time.
+    pub(crate) fn born(id: u64, sweep: &Sweep<'_>, sighting: &Sighting) -> Self {
+        let Sweep { params, frame, .. } = *sweep;
+        let own = params.birth.velocity_sigma_mps;
+        // At rest, or along with the sensor: whatever is between.
+        let velocity = Matrix3::identity() * (own * own) + frame.velocity_mps * frame.velocity_mps.transpose();
+        let mean = [sighting.centroid_m, Vector3::zeros(), params.birth.size()];
+        let mut tracked = Self {
+            id,
+            life: Life::born(sweep.number, &params.lifecycle),
+            belief: Belief::default(),
+            filter: Filter::new(mean, ANYWHERE_M, velocity, params.birth.size_sigma_m),
+            filter_ns: sighting.time_ns,
+            seen_ns: sighting.time_ns,
+            kind: Kind::Unclassified,
+            solid: None,
+        };
+        tracked.measure(sweep, sighting, false, true);
+        tracked
+    }
+
+    /// Takes in what was seen of it. `torn`: in several clusters, or in one with something else.
+    pub(crate) fn see(&mut self, sweep: &Sweep<'_>, sighting: &Sighting, torn: bool) {
+        self.life.seen(sweep.number, &sweep.params.lifecycle);
+        self.measure(sweep, sighting, torn, false);
+    }
+
+    /// It was seen, but what was seen of it tells nothing of where it is.
+    pub(crate) fn glimpse(&mut self, sweep: &Sweep<'_>, time_ns: u64) {
+        self.life.seen(sweep.number, &sweep.params.lifecycle);
+        self.seen_ns = time_ns;
+    }
+
+    fn measure(&mut self, sweep: &Sweep<'_>, sighting: &Sighting, torn: bool, first: bool) {
+        let Sweep { gathered, params, .. } = *sweep;
+        let detection = &gathered.detections()[sighting.detection];
+        let solid = gathered.solid(sighting.detection);
+        let half_m = self.half_m();
+        let solid = solid.filter(|_| !torn);
+        let (mut measured, kind, error_s) = match solid {
+            Some(solid) => (of_solid(solid, sighting, half_m, &params.fit), detection.class, params.fit.slow_s),
+            None => {
+                let half_sigma_m = (self.filter.size_covariance().trace() / 3.0).sqrt() / 2.0;
+                let measured = of_centroid(sighting, half_m, half_sigma_m, torn, &params.centroid);
+                (measured, Kind::Unclassified, params.fit.slow_s)
+            }
+        };
+        let foreign = solid.is_some() && self.is_foreign(detection, params);
+        if foreign {
+            as_foreign(&mut measured, half_m, &params.fit);
+        }
+        if sighting.time_sigma_s > 0.0 {
+            blur(&mut measured, &self.filter.velocity_mps(), &self.filter.velocity_covariance(), sighting.time_sigma_s);
+        }
+        let motion = Motion {
+            velocity_walk_mps: params.motion.velocity_walk_mps,
+            size_walk_m: params.motion.size_walk_m,
+            error_s,
+        };
+        self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion, &measured.slow);
+        self.filter_ns = sighting.time_ns;
+        self.seen_ns = sighting.time_ns;
+        // Another solid has another error.
+        let fresh = first || kind != self.kind;
+        self.kind = kind;
+        if fresh {
+            self.filter.forget_error(&measured.slow);
+        }
+        let trust = if first { 1.0 } else { self.weigh(&mut measured, fresh, params) };
+        // A sum without a root changes nothing: the track goes on as predicted.
+        let _ = self.filter.update(&measured);
+        self.belief.add(&detection.posterior, trust, &params.class);
+        if let Some(solid) = solid.filter(|_| !foreign) {
+            let [w, x, y, z] = solid.attitude_wxyz.map(f64::from);
+            let body = nalgebra::Quaternion::new(w, x, y, z);
+            let body = UnitQuaternion::try_new(body, 1e-6).unwrap_or_else(UnitQuaternion::identity);
+            let attitude = sighting.pose.attitude * body;
+            self.solid = Some(Attitude { attitude, order: axis_order(&solid.size_m) });
+        }
+    }
+
+    /// Student's t: what is far from what is expected counts less, and beyond a bound it has jumped, and has an error of
+    /// its own. Gives the weight, 0 to 1.
+    fn weigh(&mut self, measured: &mut crate::filter::Measured, fresh: bool, params: &Params) -> f64 {
+        let distance = self.filter.distance(measured);
+        let freedom = if measured.sized { 6.0 } else { 3.0 };
+        let excess = (params.fit.degrees_of_freedom + distance) / (params.fit.degrees_of_freedom + freedom);
+        if !(excess > 1.0 && excess.is_finite()) {
+            return 1.0;
+        }
+        measured.white *= excess;
+        if fresh || distance > params.fit.jump {
+            measured.slow *= excess;
+            self.filter.forget_error(&measured.slow);
+        }
+        1.0 / excess
+    }
+
+    /// Whether a detection is of a class that this obstacle surely has not.
+    fn is_foreign(&self, detection: &Detection, params: &Params) -> bool {
+        let of = detection.class.solid_index().filter(|_| self.belief.class() != Kind::Unclassified);
+        of.is_some_and(|class| self.belief.posterior()[class] < params.fit.foreign_posterior)
+    }
+
+    /// Where its centre is expected at a sensor time [m].
+    pub(crate) fn expected_m(&self, time_ns: u64) -> Vector3<f64> {
+        self.filter.position_m() + self.filter.velocity_mps() * seconds(self.filter_ns, time_ns)
+    }
+
+    /// Mean half extent that is reckoned with [m].
+    pub(crate) fn half_m(&self) -> f64 {
+        (self.filter.size_m().mean() / 2.0).clamp(HALF_M[0], HALF_M[1])
+    }
+
+    /// Covariance of its place at a sensor time [m²], and the variance of a velocity added by then.
+    pub(crate) fn spread_m2(&self, time_ns: u64, params: &Params) -> Matrix3<f64> {
+        let all = self.kinematic(time_ns, params);
+        all.fixed_view::<3, 3>(0, 0).into()
+    }
+
+    /// Covariance of position and velocity at a sensor time.
+    pub(crate) fn kinematic(&self, time_ns: u64, params: &Params) -> nalgebra::Matrix6<f64> {
+        let dt_s = seconds(self.filter_ns, time_ns);
+        let mut all = self.filter.kinematic_covariance();
+        for column in 0..6 {
+            for axis in 0..3 {
+                all[(axis, column)] += dt_s * all[(3 + axis, column)];
+            }
+        }
+        for axis in 0..3 {
+            for row in 0..6 {
+                all[(row, axis)] += dt_s * all[(row, 3 + axis)];
+            }
+        }
+        let dt_s = dt_s.abs();
+        let walk = params.motion.velocity_walk_mps.powi(2);
+        for axis in 0..3 {
+            all[(axis, axis)] += walk * dt_s.powi(3) / 3.0;
+            all[(axis, 3 + axis)] += walk * dt_s.powi(2) / 2.0;
+            all[(3 + axis, axis)] += walk * dt_s.powi(2) / 2.0;
+            all[(3 + axis, 3 + axis)] += walk * dt_s;
+        }
+        all
+    }
+
+    /// Whether a place lies in its body, or at most `margin_m` outside, at a sensor time.
+    pub(crate) fn holds(&self, place_m: &Vector3<f64>, time_ns: u64, margin_m: f64) -> bool {
+        let from = place_m - self.expected_m(time_ns);
+        let size = self.filter.size_m();
+        let Some(solid) = self.solid else { return from.norm() < self.half_m() + margin_m };
+        let along = solid.attitude.inverse() * from;
+        (0..3).all(|rank| along[solid.order[rank]].abs() < size[rank] / 2.0 + margin_m)
+    }
+}
