@@ -9,9 +9,12 @@ use clusterer::Clusterer;
 use extractor::Extractor;
 use faults::{CATALOGUE, Corruptor, Fault};
 use lidar::{MAX_RETURNS, Return, SensorFile};
-use messages::{Clusters, Cutter, Descriptors, Detections, MAX_FITS, Message, Part, Refusal, Sweep, Truth, Verdict};
+use messages::{
+    Clusters, Cutter, Descriptors, Detections, MAX_FITS, Message, Part, Refusal, Sweep, Tracks, Truth, Verdict,
+};
 use simulator::{SceneFile, Simulator};
 use stage::Stage;
+use tracker::Tracker;
 use zerocopy::FromZeros;
 
 fn config(path: &str) -> String {
@@ -146,10 +149,12 @@ struct Chain {
     clusterer: Clusterer,
     extractor: Extractor,
     classifier: Classifier,
+    tracker: Tracker,
     piece: Box<Sweep>,
     clusters: Box<Clusters>,
     descriptors: Box<Descriptors>,
     detections: Box<Detections>,
+    tracks: Box<Tracks>,
 }
 
 impl Chain {
@@ -168,18 +173,20 @@ impl Chain {
             clusterer: Clusterer::init(toml::from_str(&config("stages/clusterer.toml")).unwrap()).unwrap(),
             extractor: Extractor::init(toml::from_str(&config("stages/extractor.toml")).unwrap()).unwrap(),
             classifier: Classifier::init(params).unwrap(),
+            tracker: Tracker::init(toml::from_str(&config("stages/tracker.toml")).unwrap()).unwrap(),
             piece: Sweep::new_box_zeroed().unwrap(),
             clusters: Clusters::new_box_zeroed().unwrap(),
             descriptors: Descriptors::new_box_zeroed().unwrap(),
             detections: Detections::new_box_zeroed().unwrap(),
+            tracks: Tracks::new_box_zeroed().unwrap(),
         }
     }
 
     /// The worst verdict of each stage; how many detections, and how many fits.
-    fn answer(&mut self, number: u64, whole: &mut Sweep, sectors: u32) -> ([Verdict; 3], usize, usize) {
+    fn answer(&mut self, number: u64, whole: &mut Sweep, sectors: u32) -> ([Verdict; 4], usize, usize) {
         let cutter = Cutter::new(sectors);
         cutter.measure(whole);
-        let (mut worst, mut detections, mut fits) = ([Verdict::Complete; 3], 0, 0);
+        let (mut worst, mut detections, mut fits) = ([Verdict::Complete; 4], 0, 0);
         for sector in 0..sectors {
             let part = Part {
                 ordinal: number * u64::from(sectors) + u64::from(sector),
@@ -193,14 +200,19 @@ impl Chain {
             self.clusters.clear();
             self.descriptors.clear();
             self.detections.clear();
+            self.tracks.clear();
             let verdicts = [
                 self.clusterer.process(part, &self.piece, &mut self.clusters),
                 self.extractor.process(part, &self.clusters, &mut self.descriptors),
                 self.classifier.process(part, &self.descriptors, &mut self.detections),
+                self.tracker.process(part, &self.detections, &mut self.tracks),
             ];
             for (worst, verdict) in worst.iter_mut().zip(verdicts) {
                 *worst = if verdict.is_rejected() { verdict } else { *worst };
             }
+            let tracks = self.tracks.table.tracks.iter();
+            let numbers = tracks.flat_map(|track| [track.position_m, track.velocity_mps].concat());
+            assert!(numbers.into_iter().all(f32::is_finite), "sweep {number}");
             detections += self.detections.detections.len();
             fits += self.descriptors.fits.len();
         }
@@ -217,7 +229,7 @@ fn the_chain_answers_every_spoiled_sweep_and_the_next_one_as_ever() {
     for sectors in [1, 36] {
         let usual = chain.answer(number, &mut plain, sectors);
         number += 1;
-        assert_eq!(usual.0, [Verdict::Complete; 3]);
+        assert_eq!(usual.0, [Verdict::Complete; 4]);
         for organised in [true, false] {
             for (fault, level) in contents() {
                 for seed in 0..2 {

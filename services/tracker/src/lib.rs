@@ -19,6 +19,7 @@
 mod assignment;
 mod association;
 mod class;
+pub mod danger;
 mod filter;
 mod frame;
 mod gather;
@@ -29,6 +30,7 @@ mod params;
 mod room;
 mod sighting;
 mod snapshots;
+mod spin;
 mod table;
 mod tracked;
 mod tracking;
@@ -38,3 +40,4 @@ pub use params::{
     MotionParams, Params, ParamsError,
 };
 pub use room::Tracker;
+pub use spin::SpinParams;

@@ -1,6 +1,8 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
+use crate::spin::SpinParams;
+
 /// `config/stages/tracker.toml`, as written.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,6 +21,8 @@ pub struct Params {
     pub lifecycle: LifecycleParams,
     /// How verdicts of several sweeps add up.
     pub class: ClassParams,
+    /// How obstacles spin.
+    pub spin: SpinParams,
     /// What is a danger.
     pub danger: DangerParams,
 }
@@ -194,8 +198,8 @@ impl Params {
     }
 
     /// Each key with its value and the range that it must be in.
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 37] {
-        let Self { birth, motion, fit, centroid, association, lifecycle, class, danger } = self;
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 48] {
+        let Self { birth, motion, fit, centroid, association, lifecycle, class, spin, danger } = self;
         [
             ("birth.min_points", f64::from(birth.min_points), 1.0, 1e5),
             ("birth.velocity_sigma_mps", birth.velocity_sigma_mps, 1e-3, 1e4),
@@ -231,6 +235,17 @@ impl Params {
             ("class.weight", class.weight, 0.0, 10.0),
             ("class.kept", class.kept, 0.0, 1.0),
             ("class.floor", class.floor, 1e-9, 0.25),
+            ("spin.min_points", f64::from(spin.min_points), 1.0, 1e5),
+            ("spin.prior_radps", spin.prior_radps, 1e-3, 100.0),
+            ("spin.wander_radps", spin.wander_radps, 1e-6, 100.0),
+            ("spin.floor_rad", spin.floor_rad, 1e-4, 1.0),
+            ("spin.inflation", spin.inflation, 0.01, 100.0),
+            ("spin.ellipsoid_inflation", spin.ellipsoid_inflation, 0.01, 100.0),
+            ("spin.freedom", spin.freedom, 1.0, 1e6),
+            ("spin.blind_rad", spin.blind_rad, 1e-3, 1.0),
+            ("spin.gate", spin.gate, 1.0, 1e6),
+            ("spin.patience", f64::from(spin.patience), 1.0, 1e6),
+            ("spin.most_sigma_radps", spin.most_sigma_radps, 1e-3, 100.0),
             ("danger.own_radius_m", danger.own_radius_m, 0.0, 1e3),
             ("danger.horizon_s", danger.horizon_s, 0.0, 1e4),
             ("danger.alert_probability", danger.alert_probability, 0.0, 1.0),
@@ -281,8 +296,9 @@ mod tests {
     #[test]
     fn each_value_out_of_range_is_refused_by_name() {
         for key in keys() {
-            let whole =
-                ["min_points", "confirm_hits", "confirm_sweeps", "lost_misses"].iter().any(|end| key.ends_with(end));
+            let whole = ["min_points", "confirm_hits", "confirm_sweeps", "lost_misses", "patience"]
+                .iter()
+                .any(|end| key.ends_with(end));
             let bad = match (whole, key.as_str()) {
                 (true, _) => vec![toml::Value::Integer(0), toml::Value::Integer(4_000_000_000)],
                 (_, "birth.size_m") => vec![toml::Value::Array(vec![toml::Value::Float(0.0); 3])],

@@ -55,6 +55,11 @@ impl Stage for Tracker {
         verdict
     }
 
+    fn take_over(&mut self, before: &Self) {
+        self.tracks.copy_from(&before.tracks);
+        self.snapshots.forget();
+    }
+
     fn pass_by(input: &Detections, output: &mut Message) {
         output.detections.copy_from(input);
     }

@@ -27,6 +27,11 @@ impl Snapshots {
         Self { ring, count: 0, complete: true }
     }
 
+    /// Begins with tracks that somebody else followed before: nothing earlier can be gone back to.
+    pub(crate) fn forget(&mut self) {
+        (self.count, self.complete) = (0, false);
+    }
+
     /// Keeps the tracks as they are before a sweep later than all kept.
     pub(crate) fn keep(&mut self, sweep: u64, before: &Tracks) {
         if self.count == SNAPSHOTS {

@@ -1,8 +1,8 @@
 use messages::{ClosestApproach, MAX_TRACKS, TRACK_COVARIANCE, Track, TrackTable};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
+use crate::danger::{closest_approach, touch};
 use crate::frame::Pose;
-use crate::params::DangerParams;
 use crate::tracked::Tracked;
 use crate::tracking::Sweep;
 
@@ -55,10 +55,15 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
     let (age_sweeps, last_seen_sweeps) = track.life.ages(sweep.number);
     let (size_m, size_sigma_m, attitude) = extents(track, &to_sensor);
     let state = track.life.state(sweep.number);
+    let touch = touch(params.danger.own_radius_m, track.belief.class(), reckoned_m(track), size_sigma_m.map(f64::from));
     let approach = match track.life.is_confirmed() {
-        true => approach(&position, &velocity, &covariance, track, &params.danger),
+        true => {
+            let wider = touch.widened(&covariance);
+            closest_approach(&position, &velocity, &wider, touch.tumbling_m, params.danger.horizon_s)
+        }
         false => ClosestApproach::default(),
     };
+    let spin = track.spin.map(|spin| spin.estimate(&params.spin)).unwrap_or_default();
     let alert = f64::from(approach.collision_probability) >= params.danger.alert_probability;
     Track {
         id: track.id,
@@ -70,6 +75,8 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
         size_m,
         size_sigma_m,
         attitude_wxyz: attitude,
+        spin_radps: (to_sensor * spin.radps).map(|one| one as f32).into(),
+        spin_sigma_radps: spin.sigma_radps as f32,
         posterior: track.belief.posterior().map(|one| one as f32),
         approach,
         age_sweeps,
@@ -81,19 +88,14 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
     }
 }
 
-/// How near a track comes.
-fn approach(
-    position_m: &Vector3<f64>,
-    velocity_mps: &Vector3<f64>,
-    _covariance: &Matrix6<f64>,
-    _track: &Tracked,
-    params: &DangerParams,
-) -> ClosestApproach {
-    let square = velocity_mps.norm_squared();
-    let time_s = if square > 0.0 { -position_m.dot(velocity_mps) / square } else { 0.0 };
-    let time_s = time_s.clamp(0.0, params.horizon_s);
-    let distance_m = (position_m + velocity_mps * time_s).norm() as f32;
-    ClosestApproach { time_s: time_s as f32, distance_m, ..ClosestApproach::default() }
+/// Extents along the body's axes that danger is reckoned with [m]: those expected where none were measured.
+fn reckoned_m(track: &Tracked) -> [f64; 3] {
+    let order = track.solid.map_or([0, 1, 2], |solid| solid.order);
+    let mut size_m = [0.0; 3];
+    for (rank, &axis) in order.iter().enumerate() {
+        size_m[axis] = track.filter.size_m()[rank].max(0.0);
+    }
+    size_m
 }
 
 /// Extents along the axes of the body of the last fit, their standard deviations, and that body's attitude.

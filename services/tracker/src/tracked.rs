@@ -1,4 +1,4 @@
-use messages::Detection;
+use messages::{Detection, Solid};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::class::Belief;
@@ -8,6 +8,7 @@ use crate::lifecycle::Life;
 use crate::measurement::{AxisOrder, Kind, as_foreign, axis_order, blur, of_centroid, of_solid};
 use crate::params::Params;
 use crate::sighting::Sighting;
+use crate::spin::{AttitudeFit, SpinFilter, SpinParams};
 use crate::tracking::Sweep;
 
 /// Standard deviation of a place before it is measured [m]: wider than any fit's.
@@ -30,6 +31,8 @@ pub(crate) struct Tracked {
     kind: Kind,
     /// The last solid that was fitted.
     pub(crate) solid: Option<Attitude>,
+    /// How it turns; none before the first fit that tells.
+    pub(crate) spin: Option<SpinFilter>,
 }
 
 /// How the last solid lay.
@@ -58,6 +61,7 @@ impl Tracked {
             seen_ns: sighting.time_ns,
             kind: Kind::Unclassified,
             solid: None,
+            spin: None,
         };
         tracked.measure(sweep, sighting, false, true);
         tracked
@@ -120,6 +124,36 @@ impl Tracked {
             let body = UnitQuaternion::try_new(body, 1e-6).unwrap_or_else(UnitQuaternion::identity);
             let attitude = sighting.pose.attitude * body;
             self.solid = Some(Attitude { attitude, order: axis_order(&solid.size_m) });
+            if detection.summary.points >= params.spin.min_points {
+                self.turn(solid, detection.class, sighting, attitude, &params.spin);
+            }
+        }
+    }
+
+    /// Takes in how the solid lies.
+    fn turn(
+        &mut self,
+        solid: &Solid,
+        class: Kind,
+        sighting: &Sighting,
+        attitude: UnitQuaternion<f64>,
+        params: &SpinParams,
+    ) {
+        let to_frame = sighting.pose.attitude.to_rotation_matrix();
+        let turn = Matrix3::from_fn(|row, column| f64::from(solid.covariance_of(3 + row, 3 + column)));
+        let fit = AttitudeFit {
+            time_s: sighting.time_ns as f64 * 1e-9,
+            attitude,
+            covariance_rad2: to_frame.matrix() * turn * to_frame.matrix().transpose(),
+            class,
+            size_m: solid.size_m.map(f64::from),
+            size_sigma_m: std::array::from_fn(|axis| {
+                f64::from(solid.covariance_of(6 + axis, 6 + axis)).max(0.0).sqrt()
+            }),
+        };
+        match &mut self.spin {
+            Some(spin) => _ = spin.update(&fit, params),
+            None => self.spin = SpinFilter::new(&fit, params),
         }
     }
 

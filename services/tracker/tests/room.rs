@@ -243,6 +243,50 @@ fn a_room_that_starts_later_gives_other_numbers() {
     assert_eq!(ids, [1, MAX_TRACKS as u64 + 1, 7 * MAX_TRACKS as u64 + 1]);
 }
 
+// verifies TRA-024
+#[test]
+fn a_tracker_with_other_parameters_goes_on_where_the_one_before_it_stood() {
+    let mut before = Tracker::init(params()).unwrap();
+    let mut output = Tracks::new_box_zeroed().unwrap();
+    let mut answer = |sut: &mut Tracker, sweep: u64| {
+        output.clear();
+        sut.process(part(sweep, 0, 1), &message(sweep, EgoMotion::default(), &crowd(sweep)), &mut output);
+        output.table.tracks.iter().map(|track| (track.id, track.age_sweeps)).collect::<Vec<_>>()
+    };
+    for sweep in 0..10 {
+        answer(&mut before, sweep);
+    }
+    let mut params = params();
+    params.danger.own_radius_m = 50.0;
+    let mut next = Tracker::init(params).unwrap();
+    next.take_over(&before);
+    let (mut one, mut other) = (answer(&mut before, 10), answer(&mut next, 10));
+    // Another own radius is another order of danger.
+    one.sort_unstable();
+    other.sort_unstable();
+    assert_eq!(one, other);
+    assert!(other.iter().all(|(_, age)| *age == 11));
+}
+
+// verifies TRA-022
+#[test]
+fn what_comes_straight_at_the_craft_stands_first_and_is_an_alert() {
+    let mut sut = Played::new(params());
+    for sweep in 0..30 {
+        let passing = moving([9.0, -8.0, 0.0], [0.0, 0.8, 0.0], sweep);
+        let coming = moving([12.0, 0.6, 0.0], [-0.8, 0.0, 0.0], sweep);
+        sut.sweep(&[passing, coming]);
+    }
+    let [first, second] = &sut.output.table.tracks[..] else { panic!("{:?}", sut.output.table.tracks) };
+    assert!(first.position_m[1] > 0.0, "{first:?}");
+    // 12 m off, 9.6 m by now, at 0.8 m/s: past the sensor after 12 s, half a metre beside it.
+    assert!(first.approach.collision_probability > 0.99 && first.alert == 1, "{:?}", first.approach);
+    assert!((first.approach.time_s - 12.0).abs() < 0.3, "{:?}", first.approach);
+    assert!((first.approach.distance_m - 0.6).abs() < 0.1, "{:?}", first.approach);
+    assert!(second.approach.collision_probability < 1e-3 && second.alert == 0, "{:?}", second.approach);
+    assert!((second.approach.distance_m - 9.0).abs() < 0.1, "{:?}", second.approach);
+}
+
 /// Some obstacles in motion, by key: in the order in which the beam passes them.
 fn crowd(sweep: u64) -> Vec<(u32, Seen)> {
     let mut all: Vec<Seen> = (0..24)

@@ -291,9 +291,9 @@ impl Report {
         if let Some(SafeReport { by: By::Executive, reason, .. }) = &self.safe_entered {
             return Some(format!("safe mode was entered: {reason}"));
         }
-        let LostSweeps { detections, labels } = self.lost_sweeps;
-        if detections + labels > 0 {
-            return Some(format!("a file failed: detections lack {detections} sweeps, labels {labels}"));
+        let LostSweeps { detections, tracks, labels } = self.lost_sweeps;
+        if detections + tracks + labels > 0 {
+            return Some(format!("a file failed: detections lack {detections} sweeps, tracks {tracks}, labels {labels}"));
         }
         if let Some(TraceReport { lost, failed: true, .. }) = self.trace {
             return Some(format!("a file failed: the trace lacks {lost} parts"));
