@@ -41,6 +41,8 @@ impl Watch<'_> {
     pub(crate) fn take_over_modes(&mut self) -> Step {
         let (mode, step) = (Mode::from_number(self.page.mode.get()), self.stages[0].page.step.get());
         self.ladder_stood = self.modes.take_over(mode, Step::from_number(step as u32));
+        // Whoever died while all was restarted had let the source stand still.
+        self.stages[0].page.pause.set(u64::from(self.modes.is_paused()));
         self.modes.report.changes = self.page.mode_changes.get();
         self.modes.report.late = self.page.modes_late.get();
         self.refusals.take_over(self.page.commands_refused.get());
