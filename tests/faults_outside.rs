@@ -152,6 +152,13 @@ fn a_stage_that_dies_while_there_is_no_shared_memory_to_join_comes_back_as_confi
     run.inject(&["kill", "extractor"]);
     wait_for_lives(&run, 2);
     run.wait_for_more(3);
+    // What a death leaves in the new files is settled and cleaned as ever.
+    run.inject(&["kill", "classifier"]);
+    run.wait_for(|status| {
+        let classifier = &status["stages"][3];
+        (&classifier["restarts"], &classifier["state"]) == (&2.into(), &"running".into())
+    });
+    run.wait_for_more(3);
     assert_ne!(run.status().unwrap()["mode"], "safe");
     stop(&run);
     let run = run.collect(child).expect_code(0);
