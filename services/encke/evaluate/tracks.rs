@@ -4,7 +4,7 @@ use classifier::Classifier;
 use ground::{
     Danger, EvaluateError, Follower, Judge, Progress, TrackEvaluation, TracksNote, TracksPlan, UnknownTracks,
 };
-use messages::{Descriptors, Detections, Part, Tracks};
+use messages::{Descriptors, Detections, Part, Tracks, Verdict};
 use runtime::clock;
 use stage::Stage;
 use tracker::Tracker;
@@ -28,8 +28,9 @@ pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     plan.check().map_err(|cause| Failure::start(format!("{}: {cause}", path.display())))?;
     let chain = run::plan(&as_run(args), &assets)?;
     let classifier = dispatch::init::<Classifier>(&chain, |params| dispatch::add_model(&chain, &assets, params))?;
-    let tracker = dispatch::init::<Tracker>(&chain, |_| Ok(()))?;
-    let danger = dispatch::params::<Tracker>(&chain)?.danger;
+    drop(dispatch::init::<Tracker>(&chain, |_| Ok(()))?);
+    let params = dispatch::params::<Tracker>(&chain)?;
+    let danger = params.danger;
     let danger =
         Danger { own_radius_m: danger.own_radius_m, horizon_s: danger.horizon_s, alert: danger.alert_probability };
     let recording = args.from.is_some().then(|| sources::open(&chain.source, &assets)).transpose()?;
@@ -46,8 +47,11 @@ pub(super) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
         Box::new(move |input: &Descriptors, output: &mut Detections| classifier.process(PART, input, output))
     };
     let followers = || -> Follower {
-        let mut tracker = tracker.clone();
-        Box::new(move |part: Part, input: &Detections, output: &mut Tracks| tracker.process(part, input, output))
+        // Each is made anew: what a copy keeps has no room to grow into. It was made once, so it can be again.
+        let mut tracker = Tracker::init(params).ok();
+        Box::new(move |part: Part, input: &Detections, output: &mut Tracks| {
+            tracker.as_mut().map_or(Verdict::RejectedMalformed, |tracker| tracker.process(part, input, output))
+        })
     };
     let note = || -> Result<TracksNote, Failure> {
         Ok(TracksNote {

@@ -51,8 +51,8 @@ pub use run_report::{RunFigures, RunReportError};
 pub use solids::{SetPlan, SolidsPlan, SolidsPlanError, SolidsReport, TrainSolidsError, TrainedSolids, train_solids};
 pub use tracks::{
     ALPHAS, Bodies, Classes, ClearMot, Confirming, Consistency, CostPlan, Danger, Encounter, Encounters,
-    EncountersPlan, Followed, Follower, Followers, Foreseen, Hota, Identity, Nees, PROBABILITY_BINS, ProbabilityBin,
-    ProbabilityTable, RootMeanSquare, TrackErrors, TrackEvaluation, TrackScores, TrackerTime, TracksNote, TracksPlan,
-    UnknownTracks,
+    EncountersPlan, Followed, Follower, Followers, Foreseen, HardObstacle, Hota, Identity, Nees, PROBABILITY_BINS,
+    ProbabilityBin, ProbabilityTable, RootMeanSquare, TrackErrors, TrackEvaluation, TrackScores, TrackerTime,
+    TracksNote, TracksPlan, UnknownTracks,
 };
 pub use train::{Progress, TrainError, Trained, train};

@@ -99,7 +99,8 @@ impl Hota {
             let each = matches.iter().enumerate().filter(|(_, both)| **both > 0.0);
             level.association = each
                 .map(|(place, &both)| both * both / (objects[place / width] + claims[place % width] - both).max(1.0))
-                .sum();
+                // Nothing sums to -0.
+                .fold(0.0, |sum, one| sum + one);
         }
         sum
     }

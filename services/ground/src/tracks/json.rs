@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::classes::{AFTER, LEAST_RETURNS};
 use super::consistency::Nees;
 use super::errors::RETURNS;
-use super::{Followed, RootMeanSquare, TrackEvaluation, UnknownTracks};
+use super::{Followed, HardObstacle, RootMeanSquare, TrackEvaluation, UnknownTracks};
 use crate::RunNote;
 use crate::bars::json::{bar, reliability, rounded, share};
 
@@ -41,6 +41,7 @@ impl TrackEvaluation {
                 "association": hota.association().map(rounded),
                 "localisation": hota.localisation().map(rounded),
             },
+            "hardest": scores.hardest.iter().map(hardest).collect::<Vec<_>>(),
             "errors": self.errors_json(),
             "nees": self.nees_json(),
             "confirming": {
@@ -176,6 +177,21 @@ fn followed(row: &Followed) -> Value {
         "mota": row.clear.mota().map(rounded),
         "motp_m": row.clear.motp_m().map(rounded),
         "idf1": row.identity.idf1().map(rounded),
+    })
+}
+
+fn hardest(one: &HardObstacle) -> Value {
+    json!({
+        "scene": one.scene,
+        "obstacle": one.id,
+        "class": one.class.name(),
+        "size_m": one.size_m.map(rounded),
+        "returns": one.returns,
+        "range_m": rounded(one.range_m),
+        "sweeps": one.sweeps,
+        "missed": one.missed,
+        "tracks": one.tracks,
+        "off_m": mean_square(&one.off_m),
     })
 }
 

@@ -16,6 +16,7 @@ mod errors;
 mod frame;
 #[cfg(test)]
 mod golden;
+mod hardest;
 mod hota;
 mod identity;
 mod json;
@@ -43,6 +44,7 @@ pub use consistency::{Consistency, Nees};
 pub use cost::TrackerTime;
 pub use encounters::{Danger, Encounter, Encounters, Foreseen};
 pub use errors::{RootMeanSquare, TrackErrors};
+pub use hardest::HardObstacle;
 pub use hota::{ALPHAS, Hota};
 pub use identity::Identity;
 pub use json::TracksNote;
@@ -106,7 +108,7 @@ impl TrackEvaluation {
                 0 => Trails::of(&sweeps, LEAST_RETURNS, plan.match_m),
                 _ => Trails::default(),
             };
-            Ok((TrackScores::of(&sweeps, plan), trails))
+            Ok((TrackScores::of(&sweeps, plan, number), trails))
         });
         let (mut scores, mut trails) = (TrackScores::default(), None);
         for scene in done {

@@ -27,6 +27,7 @@ impl TrackEvaluation {
         self.write_head(page, note)?;
         write_bars(page, &self.bars())?;
         self.write_followed(page)?;
+        self.write_hardest(page)?;
         page.push_str("<h2>One scene</h2>");
         page.push_str(&figure(
             &self.trails.svg(),
@@ -120,6 +121,31 @@ impl TrackEvaluation {
                 confirming.never
             )?;
         }
+        Ok(())
+    }
+
+    fn write_hardest(&self, page: &mut String) -> fmt::Result {
+        page.push_str("<p>Followed worst:</p><div class=\"wide\"><table><tr>");
+        let head =
+            ["Scene", "Obstacle", "Class", "Extents [m]", "Returns", "Distance [m]", "Sweeps", "Missed", "Tracks"];
+        head.iter().chain(&["Off [m]"]).try_for_each(|name| write!(page, "<th class=\"n\">{name}</th>"))?;
+        page.push_str("</tr>");
+        for one in &self.scores.hardest {
+            let cells = [
+                one.scene.to_string(),
+                one.id.to_string(),
+                one.class.name().to_owned(),
+                one.size_m.map(|extent| format!("{extent:.1}")).join(" × "),
+                one.returns.to_string(),
+                format!("{:.1}", one.range_m),
+                one.sweeps.to_string(),
+                one.missed.to_string(),
+                one.tracks.to_string(),
+                cell(one.off_m.value(), 3),
+            ];
+            write_row(page, &cells)?;
+        }
+        page.push_str("</table></div>");
         Ok(())
     }
 

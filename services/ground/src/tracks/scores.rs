@@ -9,6 +9,7 @@ use super::confirming::Confirming;
 use super::consistency::Consistency;
 use super::errors::TrackErrors;
 use super::frame::{Frame, Looked, is_believed};
+use super::hardest::HardObstacle;
 use super::hota::Hota;
 use super::identity::Identity;
 use super::pair::pairs;
@@ -54,11 +55,13 @@ pub struct TrackScores {
     pub obstacles: u32,
     /// Tracks that were ever confirmed.
     pub tracks: u32,
+    /// Obstacles that were followed worst, worst first; a few.
+    pub hardest: Vec<HardObstacle>,
 }
 
 impl TrackScores {
-    /// Of one scene.
-    pub(crate) fn of(sweeps: &[Looked], plan: &TracksPlan) -> Self {
+    /// Of one scene, the plan's `number`-th.
+    pub(crate) fn of(sweeps: &[Looked], plan: &TracksPlan, number: u32) -> Self {
         let frames = |least_returns, match_m| -> Vec<Frame> {
             sweeps.iter().map(|looked| Frame::of(looked, least_returns, match_m)).collect()
         };
@@ -84,6 +87,7 @@ impl TrackScores {
             classes: Classes::of(sweeps, plan.match_m),
             bodies: Bodies::of(&pairs),
             obstacles: ids(|frame| frame.actual.iter().map(|&id| id.into()).collect()),
+            hardest: HardObstacle::of(number, sweeps, &judged, &pairs),
             tracks: believed.map(|track| track.id).collect::<BTreeSet<_>>().len() as u32,
         }
     }
@@ -105,6 +109,8 @@ impl TrackScores {
         self.bodies.add(&other.bodies);
         self.obstacles += other.obstacles;
         self.tracks += other.tracks;
+        self.hardest.extend(other.hardest.iter().cloned());
+        HardObstacle::keep_worst(&mut self.hardest);
     }
 
     /// Counts as they are judged: obstacles of at least 5 returns, within the plan's distance.

@@ -41,6 +41,7 @@ impl fmt::Display for TrackEvaluation {
             share(hota.association()),
             share(hota.localisation())
         )?;
+        self.say_hardest(f)?;
         writeln!(f, "\nroot mean square errors of confirmed tracks: position [m], velocity [m/s], of")?;
         for (row, &returns) in RETURNS.iter().enumerate() {
             let (position, velocity) = (scores.errors.position_m[row], scores.errors.velocity_mps[row]);
@@ -100,6 +101,19 @@ impl fmt::Display for TrackEvaluation {
 }
 
 impl TrackEvaluation {
+    fn say_hardest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\nfollowed worst: scene and obstacle, class, extents [m], returns, distance [m]")?;
+        writeln!(f, "{:>58}   sweeps   missed   tracks  off [m]", "")?;
+        for one in &self.scores.hardest {
+            let size = one.size_m.map(|extent| format!("{extent:.1}")).join(" x ");
+            write!(f, "{:>6}/{:<4}{:>12}{size:>18}", one.scene, one.id, one.class.name())?;
+            write!(f, "{:>8}{:>8.1}", one.returns, one.range_m)?;
+            let off = cell(one.off_m.value(), 3);
+            writeln!(f, "{:>11}{:>9}{:>9}{off:>9}", one.sweeps, one.missed, one.tracks)?;
+        }
+        Ok(())
+    }
+
     fn say_classes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let classes = &self.scores.classes;
         write!(f, "\nclass right after sweeps")?;
