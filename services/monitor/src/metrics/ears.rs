@@ -58,8 +58,11 @@ impl<'a> Ears<'a> {
             self.leave();
             self.supervisor_pid = look.supervisor_pid;
         }
-        if self.tap.is_none() {
-            self.tap = self.attach();
+        // Where the chain goes on with other files in shared memory, it is tapped anew; it may not have made them yet.
+        if self.tap.as_ref().is_none_or(|(_, node)| node.is_left_behind())
+            && let Some(tap) = self.attach()
+        {
+            self.tap = Some(tap);
         }
         while let Some((tap, _)) = &self.tap {
             match tap.take() {
