@@ -102,6 +102,7 @@ impl Body {
     }
 }
 
+// verifies TRA-023
 #[test]
 fn the_spin_of_every_class_is_found_within_its_deviation() {
     for class in ObstacleClass::SOLIDS {
