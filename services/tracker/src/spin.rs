@@ -8,7 +8,7 @@
 //! Otherwise |dω/dt| ≤ |ω|²/√3, for by Euler's equations each component is (I₂ − I₃)/I₁·ω₂·ω₃ and so on, and moments of
 //! inertia obey |I₂ − I₃| ≤ I₁: 0.09 rad/s² at 0.4 rad/s. [`SpinParams::wander_radps`] must cover what is expected of it.
 
-pub use fit::AttitudeFit;
+pub(crate) use fit::AttitudeFit;
 use fit::{blind, is_usable, noise};
 use lidar::ObstacleClass;
 use nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, Vector3};
@@ -32,7 +32,7 @@ const MOST_PRIORS: f64 = 4.0;
 
 /// Which part of an angular velocity is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Observed {
+pub(crate) enum Observed {
     /// None of it.
     #[default]
     Nothing,
@@ -44,19 +44,19 @@ pub enum Observed {
 
 /// Angular velocity of an obstacle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SpinEstimate {
+pub(crate) struct SpinEstimate {
     /// Angular velocity in the frame of the attitudes [rad/s]. Of a cylinder or cone only the component across its axis at
     /// the time of the last fit: the one about the axis counts as 0. All 0 where nothing is observed.
-    pub radps: Vector3<f64>,
+    pub(crate) radps: Vector3<f64>,
     /// Standard deviation along each of the directions that are known, in the root mean square [rad/s]; 0 where nothing is.
-    pub sigma_radps: f64,
+    pub(crate) sigma_radps: f64,
     /// What is known.
-    pub observed: Observed,
+    pub(crate) observed: Observed,
 }
 
 /// The filter of one obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpinFilter {
+pub(crate) struct SpinFilter {
     time_s: f64,
     class: ObstacleClass,
     attitude: Rotation3<f64>,
@@ -79,7 +79,7 @@ fn symmetry(class: ObstacleClass) -> Option<Symmetry> {
 
 impl SpinFilter {
     /// Starts with a first fit; none for an unclassified one, or one that is not a number.
-    pub fn new(fit: &AttitudeFit, params: &SpinParams) -> Option<Self> {
+    pub(crate) fn new(fit: &AttitudeFit, params: &SpinParams) -> Option<Self> {
         symmetry(fit.class)?;
         if !is_usable(fit) {
             return None;
@@ -100,7 +100,7 @@ impl SpinFilter {
 
     /// Takes a later fit into account; whether it counted. Fits from before the last one, of no class, or that are not
     /// numbers do not.
-    pub fn update(&mut self, fit: &AttitudeFit, params: &SpinParams) -> bool {
+    pub(crate) fn update(&mut self, fit: &AttitudeFit, params: &SpinParams) -> bool {
         let (Some(theirs), Some(ours)) = (symmetry(fit.class), symmetry(self.class)) else { return false };
         if !is_usable(fit) || fit.time_s < self.time_s {
             return false;
@@ -128,7 +128,7 @@ impl SpinFilter {
     }
 
     /// What is known at the time of the last fit.
-    pub fn estimate(&self, params: &SpinParams) -> SpinEstimate {
+    pub(crate) fn estimate(&self, params: &SpinParams) -> SpinEstimate {
         let spread: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(3, 3).into();
         let (across, dimensions, observed) = match symmetry(self.class) {
             Some(Symmetry::Planes) => (Matrix3::identity(), 3.0, Observed::Whole),

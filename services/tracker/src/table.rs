@@ -1,5 +1,5 @@
 use messages::{ClosestApproach, MAX_TRACKS, TRACK_COVARIANCE, Track, TrackTable};
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion};
 
 use crate::danger::{closest_approach, touch};
 use crate::frame::Pose;

@@ -5,19 +5,19 @@ use super::SpinParams;
 
 /// What a fit says of the attitude in one sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AttitudeFit {
+pub(crate) struct AttitudeFit {
     /// Time of the fit; any zero, but the same for all of an obstacle [s].
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Rotation from the body to the frame in which the angular velocity is wanted.
-    pub attitude: UnitQuaternion<f64>,
+    pub(crate) attitude: UnitQuaternion<f64>,
     /// Covariance of a small turn after the attitude, about that frame's axes [rad²].
-    pub covariance_rad2: Matrix3<f64>,
+    pub(crate) covariance_rad2: Matrix3<f64>,
     /// What the obstacle was taken for.
-    pub class: ObstacleClass,
+    pub(crate) class: ObstacleClass,
     /// Full extents along the body's axes [m].
-    pub size_m: [f64; 3],
+    pub(crate) size_m: [f64; 3],
     /// Standard deviations of the extents [m].
-    pub size_sigma_m: [f64; 3],
+    pub(crate) size_sigma_m: [f64; 3],
 }
 
 /// Whether it is a fit at all: finite, variances not negative.
