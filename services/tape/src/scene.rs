@@ -120,7 +120,8 @@ mod tests {
         let all = ObstacleClass::ALL.map(|class| (class, class != ObstacleClass::Unclassified));
         let update = update(&mut Scenes::default(), &message(&all));
         let [cube, ball, cylinder, cone, loose] = &update.entities[..] else { panic!("{}", update.entities.len()) };
-        let place = Some(pose([1.0, 2.0, 3.0], [0.5, -0.5, 0.5, -0.5]));
+        let at = pose([1.0, 2.0, 3.0], [0.5, -0.5, 0.5, -0.5]);
+        let place = Some(at);
         let size = Some(Vector3 { x: 4.0, y: 5.0, z: 6.0 });
         assert_eq!((cube.cubes[0].pose, cube.cubes[0].size), (place, size));
         assert_eq!((ball.spheres[0].pose, ball.spheres[0].size), (place, size));
@@ -130,7 +131,7 @@ mod tests {
             assert_eq!((drawn.bottom_scale, drawn.top_scale), (1.0, top_scale));
         }
         assert_eq!(loose.spheres[0].pose, Some(pose([3.0, 4.0, 0.0], [1.0, 0.0, 0.0, 0.0])));
-        assert_eq!(place.unwrap().orientation, Some(Quaternion { w: 0.5, x: -0.5, y: 0.5, z: -0.5 }));
+        assert_eq!(at.orientation, Some(Quaternion { w: 0.5, x: -0.5, y: 0.5, z: -0.5 }));
         let primitives = |entity: &SceneEntity| entity.cubes.len() + entity.spheres.len() + entity.cylinders.len();
         assert!(update.entities.iter().all(|entity| primitives(entity) == 1));
     }

@@ -59,7 +59,7 @@ function drawTracks(pen, tracks, place, colourOf, word) {
     pen.font = track.alert ? "600 12px system-ui, sans-serif" : "11px system-ui, sans-serif";
     const sign = { tentative: "?", confirmed: "", coasting: "~" }[track.state];
     const danger = track.alert ? ` ALERT ${track.time.toFixed(1)} s, p ${met(track.met)}` : "";
-    word(`${sign}#${track.id}${danger}`, track.at, colour, -20);
+    word(`${sign}#${track.id}${danger}`, track.at, colour, track.alert ? -30 : -20);
     pen.globalAlpha = 1;
   }
   pen.lineCap = "butt";
