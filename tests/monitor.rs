@@ -52,7 +52,7 @@ fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_raw(child.id() as i32).unwrap(), signal).unwrap();
 }
 
-/// A viewer that has subscribed to channels 1 to 5 under the same numbers.
+/// A viewer that has subscribed to channels 1 to 6 under the same numbers.
 fn viewer(address: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = address.into_client_request().unwrap();
     request.headers_mut().insert("sec-websocket-protocol", "foxglove.sdk.v1".parse().unwrap());
@@ -60,7 +60,7 @@ fn viewer(address: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     if let MaybeTlsStream::Plain(stream) = viewer.get_ref() {
         stream.set_read_timeout(Some(Duration::from_secs(100))).unwrap();
     }
-    let each = (1..=5).map(|id| format!(r#"{{"id":{id},"channelId":{id}}}"#)).collect::<Vec<_>>().join(",");
+    let each = (1..=6).map(|id| format!(r#"{{"id":{id},"channelId":{id}}}"#)).collect::<Vec<_>>().join(",");
     viewer.send(Message::text(format!(r#"{{"op":"subscribe","subscriptions":[{each}]}}"#))).unwrap();
     viewer
 }
@@ -103,6 +103,7 @@ fn top_shows_the_stages_and_counts_that_the_status_has() {
         }
     }
     assert!(view["detections"]["rows"].as_array().unwrap().iter().any(|row| row["p"].is_number()), "{view}");
+    assert!(view["tracks"]["states"].as_array().unwrap().len() == 3, "{view}");
     assert!(view["tap"]["parts"].as_u64().unwrap() > 0);
     let finished = stop(run, child);
     assert!(finished.is_closed());
@@ -116,12 +117,12 @@ fn top_without_a_chain_says_so_and_does_not_start() {
 }
 
 #[test]
-fn a_viewer_gets_sweeps_clusters_obstacles_and_status_and_ends_with_the_chain() {
+fn a_viewer_gets_sweeps_clusters_obstacles_tracks_and_status_and_ends_with_the_chain() {
     let (run, child) = running("realtime");
     let (mut server, address) = live(&run);
     let mut viewer = viewer(&address);
-    let mut times: [Vec<u64>; 6] = Default::default();
-    while [1, 2, 3].iter().any(|&channel: &usize| times[channel].len() < 2) || times[5].is_empty() {
+    let mut times: [Vec<u64>; 7] = Default::default();
+    while [1, 2, 3, 6].iter().any(|&channel: &usize| times[channel].len() < 2) || times[5].is_empty() {
         let (channel, time_ns, payload) = data(&mut viewer);
         assert!(!payload.is_empty());
         if channel == 5 {
@@ -130,7 +131,7 @@ fn a_viewer_gets_sweeps_clusters_obstacles_and_status_and_ends_with_the_chain() 
         }
         times[channel as usize].push(time_ns);
     }
-    for channel in [1, 2, 3] {
+    for channel in [1, 2, 3, 6] {
         assert!(times[channel].windows(2).all(|pair| pair[0] < pair[1]), "sweeps come once and in order");
     }
     let finished = stop(run, child);

@@ -103,7 +103,8 @@ fn another_reader_finds_as_many_messages_as_the_report_counts() {
         assert!(whole);
         let found: BTreeMap<String, u64> = found.iter().map(|(topic, all)| (topic.clone(), all.len() as u64)).collect();
         assert_eq!(found, reported(&finished.report, "messages"));
-        for topic in ["sweep", "clusters", "detections", "truth", "raw/sweep", "raw/detections"] {
+        for topic in ["sweep", "clusters", "detections", "tracks", "truth", "raw/sweep", "raw/detections", "raw/tracks"]
+        {
             // At real time the tape stands back behind everybody else, and counts what that costs.
             let topic = format!("/encke/{topic}");
             let lost = reported(&finished.report, "lost").get(&topic).copied().unwrap_or(0);

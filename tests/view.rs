@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use messages::{Message, Sweep, Truth};
+use messages::{ClosestApproach, Message, Sweep, Track, TrackState, TrackTable, Truth};
 use support::{encke, text};
 use tape::{About, Tape, TapeFile};
 use zerocopy::FromZeros;
@@ -39,10 +39,34 @@ fn record(path: &Path) -> Vec<usize> {
         let trace = rooms::trace(number, 7_000_000);
         tape.sweep(1, &trace, &sweep);
         tape.detections(1, &trace, &rooms.detections);
+        tape.tracks(1, &trace, &tracks(number));
         returns.push(sweep.returns.len());
     }
     tape.finish(1).unwrap();
     returns
+}
+
+/// Two tracks, of which one is on alert and the other was not seen; with the last sweep they are not known.
+fn tracks(sweep: u64) -> Box<TrackTable> {
+    let mut table = TrackTable::new_box_zeroed().unwrap();
+    table.time_ns = if sweep + 1 == SWEEPS { 0 } else { (sweep + 1) * 200_000_000 };
+    for (id, state, alert) in [(1_026, TrackState::Confirmed, 1), (1_025, TrackState::Coasting, 0)] {
+        let track = Track {
+            id,
+            state,
+            alert,
+            position_m: [10.0 - sweep as f32, 0.0, 1.0],
+            velocity_mps: [-5.0, 0.0, 0.0],
+            size_m: [1.0, 1.0, 2.0],
+            attitude_wxyz: [1.0, 0.0, 0.0, 0.0],
+            posterior: [0.0, 0.0, 0.1, 0.9],
+            class: lidar::ObstacleClass::Conical,
+            approach: ClosestApproach { time_s: 2.0, collision_probability: 0.5, ..ClosestApproach::default() },
+            ..Track::default()
+        };
+        table.tracks.push(track).unwrap();
+    }
+    table
 }
 
 fn view(args: &[&str]) -> Output {
@@ -150,6 +174,14 @@ fn the_page_draws_every_sweep_in_every_colour_without_network_or_complaint() {
         assert_eq!(shown.number("sweep"), sweep as u64);
     }
     show(&browser, &url, &["--window-size=360,640"]).expect_drawn(returns[0]);
+    let shown = show(&browser, &format!("{url}#sweep=1&list=tracks&track=1025"), &[]);
+    shown.expect_drawn(returns[1]);
+    assert_eq!(shown.number("tracks"), 2);
+    assert!(shown.dom.contains("aria-label=\"Go to track 1026, conical, on alert\""));
+    assert!(shown.dom.contains("1 confirmed, 1 coasting, 0 tentative; 1 on alert"));
+    assert_eq!(show(&browser, &format!("{url}#sweep=1&tracks=0"), &[]).number("tracks"), 0);
+    let unknown = show(&browser, &format!("{url}#sweep=2&list=tracks"), &[]);
+    assert!(unknown.number("tracks") == 0 && unknown.dom.contains("tracks not known in this sweep"));
 }
 
 #[test]

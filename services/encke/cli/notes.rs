@@ -132,9 +132,9 @@ Examples:
   encke metrics --listen 127.0.0.1:0 --instance flight-1";
 
 pub(super) const LIVE_NOTES: &str = "\
-Topics: /encke/sweep, /encke/clusters, /encke/detections, /encke/events, /encke/status. It runs behind everything else on
-the machine; what a slow viewer cannot take is not sent, and counted. Standard output has the address, and at the end where
-the messages went.
+Topics: /encke/sweep, /encke/clusters, /encke/detections, /encke/tracks, /encke/events, /encke/status. It runs behind
+everything else on the machine; what a slow viewer cannot take is not sent, and counted. Standard output has the address, and
+at the end where the messages went.
 
 Examples:
   encke live                                   then open ws://127.0.0.1:8765 in Foxglove
