@@ -1,7 +1,6 @@
 //! A normal distribution cut off by linear bounds: what rays that just met a body, or just passed it, leave of a guess.
 
-use nalgebra::{SMatrix, SVector};
-
+use super::rays::MOST_LANES;
 use super::system::MOST;
 
 /// Most bounds that are let bear: a body has nine parameters, so few more can matter.
@@ -14,37 +13,59 @@ const ROUNDS: usize = 2;
 const LEAST: f64 = 1e-14;
 const MOST_TAKEN: f64 = 1.0 - 1e-9;
 
-/// Parameters of a body, truth less fit.
-pub(crate) type Vector = SVector<f64, MOST>;
-/// Their covariance.
-pub(crate) type Square = SMatrix<f64, MOST, MOST>;
-
-/// Bounds on a body's parameters: its outline moves towards a ray by at most so much. Bounds lie side by side, parameter
-/// by parameter.
+/// Bounds on a body's parameters: its outline moves towards a ray by at most so much.
 #[derive(Debug)]
 pub(crate) struct Bounds {
+    blocks: Vec<Block>,
+}
+
+/// Bounds side by side.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct Block {
     /// How fast the outline moves towards the ray, by parameter.
-    rows: [Vec<f64>; MOST],
-    /// How far it is off [m]; negative where the fit is beyond.
-    slack_m: Vec<f64>,
-    /// Variance and mean of how far the outline has moved, as is known by now; infinite for bounds that bear already.
-    variance: Vec<f64>,
-    mean: Vec<f64>,
-    /// Covariance of that and of how far the outline has moved towards one of the rays.
-    along: Vec<f64>,
+    pub(crate) rows: [[f64; MOST_LANES]; MOST],
+    /// How far it is off [m]; negative where the fit is beyond, infinite for what is no bound, or bears already.
+    pub(crate) slack_m: [f64; MOST_LANES],
+    /// Variance and mean of how far the outline has moved, as is known by now.
+    variance: [f64; MOST_LANES],
+    mean: [f64; MOST_LANES],
+}
+
+impl Block {
+    /// No bounds.
+    pub(crate) const NONE: Self = Self {
+        rows: [[0.0; MOST_LANES]; MOST],
+        slack_m: [f64::INFINITY; MOST_LANES],
+        variance: [0.0; MOST_LANES],
+        mean: [0.0; MOST_LANES],
+    };
+
+    /// How far the outline moves when the first parameters change.
+    #[inline(always)]
+    fn moved(&self, change: &[f64]) -> [f64; MOST_LANES] {
+        let mut moved = [0.0; MOST_LANES];
+        for (row, by) in self.rows.iter().zip(change) {
+            for (moved, row) in moved.iter_mut().zip(row) {
+                *moved += row * by;
+            }
+        }
+        moved
+    }
 }
 
 /// A normal distribution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Normal {
-    pub(crate) mean: Vector,
-    pub(crate) covariance: Square,
+    pub(crate) mean: [f64; MOST],
+    /// Row by row, symmetric.
+    pub(crate) covariance: [[f64; MOST]; MOST],
 }
 
 /// A bound that bears, as a measurement of how far the outline has moved: its precision, and that times what it says.
 #[derive(Clone, Copy, Debug)]
 struct Bearing {
-    row: Vector,
+    row: [f64; MOST],
     slack_m: f64,
     precision: f64,
     pull: f64,
@@ -53,59 +74,50 @@ struct Bearing {
 /// How a distribution changes when one of its bounds is weighed: by these multiples of `along` and its square.
 #[derive(Clone, Copy, Debug)]
 struct Change {
-    along: Vector,
+    along: [f64; MOST],
     shift: f64,
     shrink: f64,
 }
 
 impl Bounds {
-    /// Room for `most` bounds.
+    /// Room for the bounds of `most` blocks.
     pub(crate) fn new(most: usize) -> Self {
-        let column = || Vec::with_capacity(most);
-        Self {
-            rows: std::array::from_fn(|_| column()),
-            slack_m: column(),
-            variance: column(),
-            mean: column(),
-            along: column(),
-        }
+        Self { blocks: Vec::with_capacity(most) }
     }
 
     pub(crate) fn clear(&mut self) {
-        self.rows.iter_mut().for_each(Vec::clear);
-        self.slack_m.clear();
+        self.blocks.clear();
     }
 
-    /// Adds a bound: `sign` times `row`, over all parameters, moves the outline by at most `slack_m`.
-    pub(crate) fn push(&mut self, row: &[f64], sign: f64, slack_m: f64) {
-        for (place, column) in self.rows.iter_mut().enumerate() {
-            column.push(sign * row.get(place).copied().unwrap_or(0.0));
-        }
-        self.slack_m.push(slack_m);
+    pub(crate) fn push(&mut self, block: &Block) {
+        self.blocks.push(*block);
     }
 
-    /// What is left of a distribution about 0, by expectation propagation (Minka 2001): each bound that bears is replaced
-    /// by the measurement that leaves the same mean and variance of what it bounds. The one that is overstepped farthest
-    /// comes first, and so on while one is. Bounds are soft, by the standard deviation `blur_m`.
+    /// What is left of a distribution about 0, of the first `count` parameters, by expectation propagation (Minka 2001): each
+    /// bound that bears is replaced by the measurement that leaves the same mean and variance of what it bounds. The one
+    /// that is overstepped farthest comes first, and so on while one is. Bounds are soft, by the standard deviation
+    /// `blur_m`. Takes the bounds that bear away.
     ///
-    /// Many rays that bound the same edge do not add up: once one bears, the others are far off.
+    /// Many rays that bound the same edge do not add up: once one bears, the others are far off. Between two bounds a
+    /// fifth more is left than should be.
     #[inline(always)]
-    pub(crate) fn narrow(&mut self, covariance: &Square, blur_m: f64) -> Normal {
-        let mut normal = Normal { mean: Vector::zeros(), covariance: *covariance };
-        self.begin(covariance);
-        let mut bearing = [Bearing { row: Vector::zeros(), slack_m: 0.0, precision: 0.0, pull: 0.0 }; MOST_BEARING];
-        let mut count = 0;
-        while count < MOST_BEARING {
-            let Some(place) = self.overstepped(blur_m) else { break };
-            let row = Vector::from_fn(|axis, _| self.rows[axis][place]);
-            bearing[count] = Bearing { row, slack_m: self.slack_m[place], precision: 0.0, pull: 0.0 };
-            let change = bearing[count].weigh(&mut normal, blur_m);
-            self.follow(&change);
-            self.variance[place] = f64::INFINITY;
-            count += 1;
+    pub(crate) fn narrow(&mut self, covariance: &[[f64; MOST]; MOST], count: usize, blur_m: f64) -> Normal {
+        let mut normal = Normal { mean: [0.0; MOST], covariance: *covariance };
+        self.begin(covariance, count);
+        let mut change = Change { along: [0.0; MOST], shift: 0.0, shrink: 0.0 };
+        let mut bearing = [Bearing { row: [0.0; MOST], slack_m: 0.0, precision: 0.0, pull: 0.0 }; MOST_BEARING];
+        let mut many = 0;
+        while many < MOST_BEARING {
+            let Some((block, lane)) = self.follow(&change, count, blur_m) else { break };
+            let block = &mut self.blocks[block];
+            let bound = &mut bearing[many];
+            bound.row = block.rows.map(|row| row[lane]);
+            bound.slack_m = std::mem::replace(&mut block.slack_m[lane], f64::INFINITY);
+            change = bound.weigh(&mut normal, blur_m);
+            many += 1;
         }
         for _ in 0..ROUNDS {
-            for bound in &mut bearing[..count] {
+            for bound in &mut bearing[..many] {
                 bound.weigh(&mut normal, blur_m);
             }
         }
@@ -113,53 +125,45 @@ impl Bounds {
     }
 
     #[inline(always)]
-    fn begin(&mut self, covariance: &Square) {
-        let count = self.slack_m.len();
-        for column in [&mut self.variance, &mut self.mean, &mut self.along] {
-            column.clear();
-            column.resize(count, 0.0);
+    fn begin(&mut self, covariance: &[[f64; MOST]; MOST], count: usize) {
+        let mut by = *covariance;
+        for (axis, row) in by.iter_mut().enumerate() {
+            // Each pair of parameters counts twice.
+            row[..axis].iter_mut().for_each(|entry| *entry *= 2.0);
         }
-        for axis in 0..MOST {
-            self.move_along(&covariance.column(axis).into());
-            for ((variance, along), row) in self.variance.iter_mut().zip(&self.along).zip(&self.rows[axis]) {
-                *variance += row * along;
+        for block in &mut self.blocks {
+            let mut variance = [0.0; MOST_LANES];
+            for axis in 0..count {
+                let moved = block.moved(&by[axis][..=axis]);
+                for ((variance, moved), row) in variance.iter_mut().zip(moved).zip(block.rows[axis]) {
+                    *variance += moved * row;
+                }
             }
+            (block.variance, block.mean) = (variance, [0.0; MOST_LANES]);
         }
     }
 
-    /// Fills `along` for a change of all parameters.
+    /// Changes the distribution of each bound, and gives the one, by block and lane, that it oversteps farthest, out to
+    /// [`OUT`] standard deviations.
     #[inline(always)]
-    fn move_along(&mut self, change: &Vector) {
-        self.along.fill(0.0);
-        for (column, by) in self.rows.iter().zip(change.iter()) {
-            for (along, row) in self.along.iter_mut().zip(column) {
-                *along += row * by;
+    fn follow(&mut self, change: &Change, count: usize, blur_m: f64) -> Option<(usize, usize)> {
+        let (mut farthest_m, mut place) = ([0.0; MOST_LANES], [0; MOST_LANES]);
+        for (number, block) in self.blocks.iter_mut().enumerate() {
+            let moved = block.moved(&change.along[..count]);
+            for lane in 0..MOST_LANES {
+                let moved = moved[lane];
+                let variance = block.variance[lane] - change.shrink * moved * moved;
+                let variance = if variance > LEAST { variance } else { LEAST };
+                let mean = block.mean[lane] + change.shift * moved;
+                (block.variance[lane], block.mean[lane]) = (variance, mean);
+                let over_m = mean + OUT * (variance + blur_m * blur_m).sqrt() - block.slack_m[lane];
+                let farther = over_m > farthest_m[lane];
+                farthest_m[lane] = if farther { over_m } else { farthest_m[lane] };
+                place[lane] = if farther { number } else { place[lane] };
             }
         }
-    }
-
-    /// The bound that the distribution, out to [`OUT`] standard deviations, oversteps farthest.
-    #[inline(always)]
-    fn overstepped(&self, blur_m: f64) -> Option<usize> {
-        let (mut place, mut farthest_m) = (None, 0.0);
-        let bounds = self.slack_m.iter().zip(&self.mean).zip(&self.variance);
-        for (number, ((slack_m, mean), variance)) in bounds.enumerate() {
-            let over_m = mean + OUT * (variance + blur_m * blur_m).sqrt() - slack_m;
-            if over_m > farthest_m && over_m.is_finite() {
-                (place, farthest_m) = (Some(number), over_m);
-            }
-        }
-        place
-    }
-
-    #[inline(always)]
-    fn follow(&mut self, change: &Change) {
-        self.move_along(&change.along);
-        let bounds = self.variance.iter_mut().zip(&mut self.mean).zip(&self.along);
-        for ((variance, mean), along) in bounds {
-            *variance = (*variance - change.shrink * along * along).max(LEAST);
-            *mean += change.shift * along;
-        }
+        let lane = (1..MOST_LANES).fold(0, |best, lane| if farthest_m[lane] > farthest_m[best] { lane } else { best });
+        (farthest_m[lane] > 0.0).then_some((place[lane], lane))
     }
 }
 
@@ -167,9 +171,15 @@ impl Bearing {
     /// Takes what this bound said before out of the distribution, and puts in what it says now.
     #[inline(always)]
     fn weigh(&mut self, normal: &mut Normal, blur_m: f64) -> Change {
-        let along = normal.covariance * self.row;
-        let variance = self.row.dot(&along).max(LEAST);
-        let mean = self.row.dot(&normal.mean);
+        let mut along = [0.0; MOST];
+        for (row, by) in normal.covariance.iter().zip(self.row) {
+            for (along, entry) in along.iter_mut().zip(row) {
+                *along += entry * by;
+            }
+        }
+        let dot = |other: &[f64; MOST]| self.row.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
+        let variance = dot(&along).max(LEAST);
+        let mean = dot(&normal.mean);
         // Without this bound.
         let without = 1.0 / (1.0 / variance - self.precision).max(1e-9);
         let before = without * (mean / variance - self.pull);
@@ -187,8 +197,13 @@ impl Bearing {
         (self.precision, self.pull) = (precision, pull);
         let share = 1.0 + sharper * variance;
         let change = Change { along, shift: (further - sharper * mean) / share, shrink: sharper / share };
-        normal.covariance -= along * along.transpose() * change.shrink;
-        normal.mean += along * change.shift;
+        for ((row, mean), one) in normal.covariance.iter_mut().zip(&mut normal.mean).zip(along) {
+            let by = one * change.shrink;
+            for (entry, other) in row.iter_mut().zip(along) {
+                *entry -= by * other;
+            }
+            *mean += one * change.shift;
+        }
         change
     }
 }

@@ -7,7 +7,7 @@ use super::budget::Purse;
 use super::descent::Descent;
 use super::frames::{FRAMES, Frames, TURNED, turned};
 use super::outcome::solid_fit;
-use super::rays::{Beam, thin};
+use super::rays::{Beam, MOST_LANES, thin};
 use super::residuals::{Measure, Rays};
 use super::solid::for_kind;
 use super::spread::spread;
@@ -102,7 +102,7 @@ impl Fitter {
             full: Picked::new(settings.rays),
             axes: Vec::with_capacity(3 * FRAMES),
             descents: Vec::with_capacity(MOST_STARTS),
-            bounds: Bounds::new(2 * settings.rays),
+            bounds: Bounds::new(2 * settings.rays.div_ceil(MOST_LANES)),
         }
     }
 

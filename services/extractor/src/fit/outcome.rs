@@ -1,7 +1,6 @@
 use messages::{SOLID_PARAMETERS, Solid, SolidFit};
 use nalgebra::{Matrix3, Rotation3, SMatrix, UnitQuaternion};
 
-use super::bounds::Square;
 use super::descent::Descent;
 use super::system::{MOST, decompose, parameters, solve};
 
@@ -12,14 +11,19 @@ const ANY_TURN_RAD: f64 = 1.813_799_364_234_217_8;
 /// Most that a message says of how far the next minimum is behind.
 const FAR_BEHIND: f64 = 100.0;
 
+/// Covariance of the fit's parameters, in their own order.
+pub(crate) type Square = SMatrix<f64, MOST, MOST>;
+
 /// What a fit says of one solid, from its best descent and the next best; `spread` is the covariance of the best's
 /// parameters, in place of Gauss's and Newton's.
 pub(crate) fn solid_fit(best: &Descent, next: Option<&Descent>, spread: Option<Square>) -> SolidFit {
-    let (covariance, ln_information) =
-        inverse(&best.system.curvature, best.kind.is_round()).unwrap_or((Square::zeros(), 0.0));
+    let round = best.kind.is_round();
+    let factor = factor(&best.system.curvature, round);
+    let covariance = spread.or_else(|| factor.map(|factor| inverse(&factor, round).into()));
+    let ln_information = factor.map_or(0.0, |factor| (0..parameters(round)).map(|i| 2.0 * factor[i][i].ln()).sum());
     let behind = next.map_or(FAR_BEHIND, |next| next.cost() - best.cost());
     SolidFit {
-        solid: solid(best, &spread.unwrap_or(covariance)),
+        solid: solid(best, &covariance.unwrap_or_default()),
         hit_cost: best.parts.hits as f32,
         miss_cost: best.parts.misses as f32,
         belief_cost: best.parts.beliefs as f32,
@@ -30,31 +34,29 @@ pub(crate) fn solid_fit(best: &Descent, next: Option<&Descent>, spread: Option<S
     }
 }
 
-/// Inverse of the information of the fit's parameters, in their own order, and ln of the information's determinant. To
-/// the rays' information comes what is known without: [`FAR_M`], [`ANY_TURN_RAD`]. None where it is not positive definite.
-pub(crate) fn inverse(curvature: &[[f64; MOST]; MOST], round: bool) -> Option<(Square, f64)> {
-    let count = parameters(round);
-    let turns = 3..if round { 5 } else { 6 };
+/// Cholesky's factor of the information of the fit's parameters. To the rays' information comes what is known without:
+/// [`FAR_M`], [`ANY_TURN_RAD`]. None where it is not positive definite.
+#[inline(always)]
+pub(crate) fn factor(curvature: &[[f64; MOST]; MOST], round: bool) -> Option<[[f64; MOST]; MOST]> {
+    let turns = if round { 5 } else { 6 };
     let mut factor = *curvature;
-    for (i, row) in factor.iter_mut().enumerate().take(count) {
-        if i < 3 {
-            row[i] += FAR_M.powi(-2);
-        } else if turns.contains(&i) {
-            row[i] += ANY_TURN_RAD.powi(-2);
-        }
+    for (i, row) in factor.iter_mut().enumerate().take(turns) {
+        row[i] += if i < 3 { FAR_M.powi(-2) } else { ANY_TURN_RAD.powi(-2) };
     }
-    decompose(&mut factor, count)?;
-    let ln_information = (0..count).map(|i| 2.0 * factor[i][i].ln()).sum();
-    let mut inverse = Square::zeros();
-    for column in 0..count {
-        let mut x = [0.0; MOST];
-        x[column] = 1.0;
-        solve(&factor, count, &mut x);
-        for row in 0..count {
-            inverse[(row, column)] = x[row];
-        }
+    decompose(&mut factor, parameters(round))?;
+    Some(factor)
+}
+
+/// The inverse of what such a factor is of; 0 beyond a round body's parameters.
+#[inline(always)]
+pub(crate) fn inverse(factor: &[[f64; MOST]; MOST], round: bool) -> [[f64; MOST]; MOST] {
+    let count = parameters(round);
+    let mut inverse = [[0.0; MOST]; MOST];
+    for (place, row) in inverse.iter_mut().enumerate().take(count) {
+        row[place] = 1.0;
+        solve(factor, count, row);
     }
-    Some((inverse, ln_information))
+    inverse
 }
 
 fn solid(descent: &Descent, covariance: &Square) -> Solid {

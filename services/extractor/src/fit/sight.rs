@@ -5,7 +5,7 @@ use pulp::Simd;
 
 use super::rays::MOST_LANES;
 use super::residuals::Measure;
-use super::system::Row;
+use super::system::{MOST, Row, parameters};
 use super::wide::{Which, Wide, WideVector, along, cross, dot, minus, norm, opposite, plus, scale, shrink, times};
 use super::{Body, UnitSolid};
 
@@ -93,24 +93,34 @@ impl<S: Simd> Residuals<S> {
     /// Derivatives with respect to all parameters, and the residual after them: a row of each ray.
     #[inline(always)]
     pub(crate) fn store<const ROUND: bool>(&self, rows: &mut [Row; MOST_LANES]) {
+        self.each::<ROUND>(|values, place| put(values, rows, place));
+        put(self.residual, rows, parameters(ROUND));
+    }
+
+    /// Derivatives with respect to all parameters, parameter by parameter, from a lane on.
+    #[inline(always)]
+    pub(crate) fn store_columns<const ROUND: bool>(&self, columns: &mut [[f64; MOST_LANES]; MOST], lane: usize) {
+        self.each::<ROUND>(|values, place| values.store(&mut columns[place][lane..]));
+    }
+
+    #[inline(always)]
+    fn each<const ROUND: bool>(&self, mut put: impl FnMut(Wide<S>, usize)) {
         let normal = scale(self.normal, self.factor);
         let turn = cross(self.point, normal);
         let grow = times(normal, self.point);
-        put(normal[0], rows, 0);
-        put(normal[1], rows, 1);
-        put(normal[2], rows, 2);
-        put(turn[0], rows, 3);
-        put(turn[1], rows, 4);
+        put(normal[0], 0);
+        put(normal[1], 1);
+        put(normal[2], 2);
+        put(turn[0], 3);
+        put(turn[1], 4);
         if ROUND {
-            put(grow[0] + grow[1], rows, 5);
-            put(grow[2], rows, 6);
-            put(self.residual, rows, 7);
+            put(grow[0] + grow[1], 5);
+            put(grow[2], 6);
         } else {
-            put(turn[2], rows, 5);
-            put(grow[0], rows, 6);
-            put(grow[1], rows, 7);
-            put(grow[2], rows, 8);
-            put(self.residual, rows, 9);
+            put(turn[2], 5);
+            put(grow[0], 6);
+            put(grow[1], 7);
+            put(grow[2], 8);
         }
     }
 
@@ -212,20 +222,29 @@ pub(crate) fn miss<K: UnitSolid, S: Simd>(
     Some((violated, residuals))
 }
 
-/// How far rays pass outside the body's outline [m], with derivatives of the outline's own movement towards them, and which
-/// of them would have met it there: those that end behind it, and not off the end of an edge, where another one bounds.
+/// Bounds that rays set to the body's outline: from within where they met the cluster, else from without. Which of them are
+/// nearer than `reach_m`, how far they are off [m] (positive on the side where they should be), and how fast the outline
+/// moves towards them.
+///
+/// A ray bounds where it would have met the body: before its end, and not off the end of an edge, where another one bounds.
 #[inline(always)]
-pub(crate) fn beside<K: UnitSolid, S: Simd>(
+pub(crate) fn bound<K: UnitSolid, S: Simd>(
     sight: &Sight<S>,
     rays: (WideVector<S>, Wide<S>),
-) -> (Which<S>, Residuals<S>) {
+    within: bool,
+    reach_m: f64,
+) -> (Which<S>, Wide<S>, Residuals<S>) {
     let (direction, range_m) = rays;
     let (direction, _) = sight.directions(direction);
     let passing = K::pass(sight.half_m, sight.origin, direction);
-    let there_m = dot(minus(passing.point_m, sight.origin), direction);
-    let tells = there_m.less(range_m) & passing.along.abs().at_most(sight.all(WITHIN));
-    let (normal, point) = (passing.normal, passing.point_m);
-    (tells, Residuals { residual: passing.distance_m, factor: sight.all(1.0), normal, point })
+    let factor = sight.all(if within { -1.0 } else { 1.0 });
+    let slack_m = passing.distance_m * factor;
+    let mut near = slack_m.less(sight.all(reach_m));
+    if !within {
+        let there_m = dot(minus(passing.point_m, sight.origin), direction);
+        near = near & there_m.less(range_m) & passing.along.abs().at_most(sight.all(WITHIN));
+    }
+    (near, slack_m, Residuals { residual: slack_m, factor, normal: passing.normal, point: passing.point_m })
 }
 
 /// Residuals whose size grows with their logarithm only beyond [`SOFT`], and the slopes. A logarithm takes long: rays that

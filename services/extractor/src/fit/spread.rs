@@ -1,16 +1,17 @@
 //! How far the truth may lie from a fitted body.
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 
 use super::UnitSolid;
-use super::bounds::{Bounds, Square, Vector};
+use super::bounds::Bounds;
 use super::descent::Descent;
+use super::outcome::Square;
 use super::outline::second_moment;
 use super::residuals::{Measure, Rays, measure};
-use super::system::parameters;
+use super::system::{MOST, parameters};
 
-/// Cosine between axis and line of sight from which on a body is tried longer.
-const AWAY: f64 = 0.5;
+/// Cosine between axis and line of sight from which on a body is tried longer: of round ones, of others.
+const AWAY: [f64; 2] = [0.5, 0.8];
 /// How much longer, as a share of its length, and the range of lengths that each try stands for.
 const LONGER: [(f64, f64); 3] = [(0.5, 0.5), (1.0, 0.75), (2.0, 1.5)];
 /// Likelihood over the fit's below which a body does not count.
@@ -30,7 +31,7 @@ pub(crate) fn spread<'a, K: UnitSolid>(
     bounds: &mut Bounds,
 ) -> Option<Square> {
     let excess = best.parts.hits / rays.hits.len().max(1) as f64;
-    let mut covariance = second_moment::<K>(&best.body, rays, bounds)? * excess.max(1.0);
+    let mut covariance = second_moment::<K>(best, rays, bounds)? * excess.max(1.0);
     stretch::<K>(best, rays, &mut covariance);
     mix::<K>(best, others, &mut covariance);
     let sound = (0..parameters(K::ROUND)).all(|place| covariance[(place, place)] > 0.0);
@@ -46,7 +47,7 @@ fn stretch<K: UnitSolid>(best: &Descent, rays: &Rays<'_>, covariance: &mut Squar
     let Some(sight) = body.centre_m.try_normalize(1e-9) else { return };
     let view = body.rotation.tr_mul(&sight);
     let axis = if K::ROUND { 2 } else { view.iamax() };
-    if view[axis].abs() < AWAY {
+    if view[axis].abs() < AWAY[usize::from(!K::ROUND)] {
         return;
     }
     let growth = parameters(K::ROUND) + axis - 3;
@@ -68,7 +69,7 @@ fn stretch<K: UnitSolid>(best: &Descent, rays: &Rays<'_>, covariance: &mut Squar
     }
     if moment > 0.0 {
         // As its length grows by all of it, its middle moves by half.
-        let mut way = Vector::ith(growth, 1.0);
+        let mut way = SVector::<f64, MOST>::ith(growth, 1.0);
         way[axis] = away_m;
         *covariance += way * way.transpose() * (moment / weight);
     }
@@ -91,7 +92,7 @@ fn mix<'a, K: UnitSolid>(best: &Descent, others: impl Iterator<Item = &'a Descen
 
 /// From one body to another, in the first one's parameters but for turns. Axes that are not told apart are those that are
 /// most alike.
-fn way_to<K: UnitSolid>(from: &Descent, to: &Descent) -> Vector {
+fn way_to<K: UnitSolid>(from: &Descent, to: &Descent) -> SVector<f64, MOST> {
     let (from, to) = (&from.body, &to.body);
     let shift = from.rotation.tr_mul(&(to.centre_m - from.centre_m));
     let alike = from.rotation.tr_mul(&to.rotation);
@@ -99,7 +100,7 @@ fn way_to<K: UnitSolid>(from: &Descent, to: &Descent) -> Vector {
         let same = if K::ROUND { axis } else { alike.row(axis).transpose().iamax() };
         (to.ln_half[same] - from.ln_half[axis]).exp() - 1.0
     });
-    let mut way = Vector::zeros();
+    let mut way = SVector::<f64, MOST>::zeros();
     way.fixed_rows_mut::<3>(0).copy_from(&shift);
     if K::ROUND {
         (way[5], way[6]) = (longer.x, longer.z);
