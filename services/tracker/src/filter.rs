@@ -6,7 +6,7 @@ pub(crate) const STATES: usize = 15;
 const POSITION: usize = 0;
 const VELOCITY: usize = 3;
 const SIZE: usize = 6;
-/// Slow error of what is measured: of the centre, then of the size.
+/// Lasting error of what is measured, in units of its own standard deviation.
 const ERROR: usize = 9;
 
 type State = SVector<f64, STATES>;
@@ -19,12 +19,13 @@ type Gain = SMatrix<f64, STATES, 6>;
 /// time. Their covariances add up to that of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured {
-    /// Centre [m]; then extents, longest first [m].
+    /// Centre [m]; then extents along the body's axes [m].
     pub(crate) value: Vector6<f64>,
     /// Whether the extents were measured; else they are taken to be as expected.
     pub(crate) sized: bool,
-    /// Covariance of the lasting part of the error.
-    pub(crate) slow: Matrix6<f64>,
+    /// A root of the covariance of the lasting part of the error: that part is the root times six numbers of variance 1,
+    /// and these are what lasts. So a fit that is surer than the one before it has less of the same error.
+    pub(crate) slow_root: Matrix6<f64>,
     /// Covariance of the rest; positive definite.
     pub(crate) white: Matrix6<f64>,
 }
@@ -43,7 +44,7 @@ pub(crate) struct Motion {
 /// Kalman filter of one obstacle: constant velocity, constant size, and the lasting error of its measurements as a
 /// Gauss-Markov process (Bar-Shalom, Li and Kirubarajan 2001, Secs. 6.2 and 8.2).
 ///
-/// State: position, velocity, size (longest extent first), error of the centre, error of the size; 3 each.
+/// State: position, velocity and size, 3 each; lasting error, 6.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     mean: State,
@@ -61,8 +62,7 @@ impl Filter {
         covariance.fixed_view_mut::<3, 3>(POSITION, POSITION).fill_diagonal(sigma_m * sigma_m);
         covariance.fixed_view_mut::<3, 3>(VELOCITY, VELOCITY).copy_from(&velocity);
         covariance.fixed_view_mut::<3, 3>(SIZE, SIZE).fill_diagonal(size_sigma_m * size_sigma_m);
-        // No error yet: `forget` must come before the first update.
-        covariance.fixed_view_mut::<6, 6>(ERROR, ERROR).fill_diagonal(1e-6);
+        covariance.fixed_view_mut::<6, 6>(ERROR, ERROR).fill_diagonal(1.0);
         filter
     }
 
@@ -74,7 +74,7 @@ impl Filter {
         self.mean.fixed_rows::<3>(VELOCITY).into()
     }
 
-    /// Extents [m], longest first as far as noise allows; may be negative where they were never measured well.
+    /// Extents [m]; may be negative where they were never measured well.
     pub(crate) fn size_m(&self) -> Vector3<f64> {
         self.mean.fixed_rows::<3>(SIZE).into()
     }
@@ -92,8 +92,8 @@ impl Filter {
         self.covariance.fixed_view::<3, 3>(VELOCITY, VELOCITY).into()
     }
 
-    /// Propagates by `dt_s`, which may be negative by parts of a sweep; the lasting error goes on towards `slow`.
-    pub(crate) fn predict(&mut self, dt_s: f64, motion: &Motion, slow: &Matrix6<f64>) {
+    /// Propagates by `dt_s`, which may be negative by parts of a sweep.
+    pub(crate) fn predict(&mut self, dt_s: f64, motion: &Motion) {
         let p = &mut self.covariance;
         // F P Fᵀ: rows, then columns.
         for axis in 0..3 {
@@ -120,16 +120,28 @@ impl Filter {
             p[(to, to)] += walk * dt_s;
             p[(SIZE + axis, SIZE + axis)] += grown;
         }
-        self.fade((-dt_s / motion.error_s).exp(), slow);
+        self.fade((-dt_s / motion.error_s).exp());
     }
 
-    /// Another solid, another minimum of the fit, no fit any more: the lasting error is another one.
-    pub(crate) fn forget_error(&mut self, slow: &Matrix6<f64>) {
-        self.fade(0.0, slow);
+    /// The fit has jumped: its lasting error may be another one, larger by so many standard deviations.
+    pub(crate) fn doubt_error(&mut self, variance: f64) {
+        for place in ERROR..STATES {
+            self.covariance[(place, place)] += variance;
+        }
+    }
+
+    /// Fits say again and again that all of this is wrong: they are believed from now on.
+    pub(crate) fn reopen(&mut self, sigma_m: f64, sigma_mps: f64, size_sigma_m: f64) {
+        for (block, sigma) in [(POSITION, sigma_m), (VELOCITY, sigma_mps), (SIZE, size_sigma_m)] {
+            for axis in 0..3 {
+                self.covariance[(block + axis, block + axis)] += sigma * sigma;
+            }
+        }
+        self.fade(0.0);
     }
 
     /// Leaves `kept` of the lasting error, and renews the rest.
-    fn fade(&mut self, kept: f64, slow: &Matrix6<f64>) {
+    fn fade(&mut self, kept: f64) {
         for place in ERROR..STATES {
             self.mean[place] *= kept;
         }
@@ -143,22 +155,23 @@ impl Filter {
                 }
             }
         }
-        let mut error = self.covariance.fixed_view_mut::<6, 6>(ERROR, ERROR);
-        error += slow * (1.0 - kept * kept);
+        for place in ERROR..STATES {
+            self.covariance[(place, place)] += 1.0 - kept * kept;
+        }
     }
 
     /// Takes a measurement in, by Joseph's form. Gives its squared Mahalanobis distance from what was expected: χ² with 6
     /// degrees of freedom where the model holds. Nothing changes, and nothing comes back, where the covariances' sum has
     /// no root.
     pub(crate) fn update(&mut self, measured: &Measured) -> Option<f64> {
-        let cross = observed(&self.covariance);
+        let cross = observed(&self.covariance, &measured.slow_root);
         let innovation = self.innovation(measured);
-        let root = (seen(&cross) + measured.white).cholesky()?;
+        let root = (seen(&cross, &measured.slow_root) + measured.white).cholesky()?;
         let gain: Gain = root.solve(&cross.transpose()).transpose();
         let mean = self.mean + gain * innovation;
         // (I − K H) P (I − K H)ᵀ + K R Kᵀ, where P Hᵀ is `cross`.
         let left = self.covariance - gain * cross.transpose();
-        let both = left - (observed(&left) - gain * measured.white) * gain.transpose();
+        let both = left - (observed(&left, &measured.slow_root) - gain * measured.white) * gain.transpose();
         if !(mean.iter().all(|value| value.is_finite()) && both.iter().all(|value| value.is_finite())) {
             return None;
         }
@@ -170,18 +183,20 @@ impl Filter {
     /// Squared Mahalanobis distance of a measurement from what is expected; infinite where that has no meaning.
     pub(crate) fn distance(&self, measured: &Measured) -> f64 {
         let innovation = self.innovation(measured);
-        let root = (seen(&observed(&self.covariance)) + measured.white).cholesky();
+        let cross = observed(&self.covariance, &measured.slow_root);
+        let root = (seen(&cross, &measured.slow_root) + measured.white).cholesky();
         root.map_or(f64::INFINITY, |root| innovation.dot(&root.solve(&innovation)))
     }
 
     fn innovation(&self, measured: &Measured) -> Vector6<f64> {
-        let mut innovation = Vector6::zeros();
+        let error: Vector6<f64> = self.mean.fixed_rows::<6>(ERROR).into();
+        let mut innovation = measured.value - measured.slow_root * error;
         for axis in 0..3 {
-            innovation[axis] = measured.value[axis] - self.mean[POSITION + axis] - self.mean[ERROR + axis];
-            if measured.sized {
-                let expected = self.mean[SIZE + axis] + self.mean[ERROR + 3 + axis];
-                innovation[3 + axis] = measured.value[3 + axis] - expected;
-            }
+            innovation[axis] -= self.mean[POSITION + axis];
+            innovation[3 + axis] -= self.mean[SIZE + axis];
+        }
+        if !measured.sized {
+            innovation.fixed_rows_mut::<3>(3).fill(0.0);
         }
         innovation
     }
@@ -192,26 +207,26 @@ impl Filter {
     }
 }
 
-/// M Hᵀ: the columns of what is measured. Centre and size are each seen with the lasting error added.
-fn observed(matrix: &Covariance) -> Gain {
-    let mut columns = Gain::zeros();
+/// M Hᵀ: the columns of what is measured. Centre and size are each seen with their lasting error.
+fn observed(matrix: &Covariance, slow_root: &Matrix6<f64>) -> Gain {
+    let mut columns: Gain = matrix.fixed_view::<STATES, 6>(0, ERROR) * slow_root.transpose();
     for axis in 0..3 {
-        let centre = matrix.column(POSITION + axis) + matrix.column(ERROR + axis);
-        let size = matrix.column(SIZE + axis) + matrix.column(ERROR + 3 + axis);
-        columns.set_column(axis, &centre);
-        columns.set_column(3 + axis, &size);
+        let mut centre = columns.column_mut(axis);
+        centre += matrix.column(POSITION + axis);
+        let mut size = columns.column_mut(3 + axis);
+        size += matrix.column(SIZE + axis);
     }
     columns
 }
 
-/// H M, of the M Hᵀ of a symmetric M: H M Hᵀ.
-fn seen(cross: &Gain) -> Matrix6<f64> {
-    let mut seen = Matrix6::zeros();
-    for column in 0..6 {
-        for axis in 0..3 {
-            seen[(axis, column)] = cross[(POSITION + axis, column)] + cross[(ERROR + axis, column)];
-            seen[(3 + axis, column)] = cross[(SIZE + axis, column)] + cross[(ERROR + 3 + axis, column)];
-        }
+/// H M Hᵀ, of the M Hᵀ of a symmetric M.
+fn seen(cross: &Gain, slow_root: &Matrix6<f64>) -> Matrix6<f64> {
+    let mut seen: Matrix6<f64> = slow_root * cross.fixed_view::<6, 6>(ERROR, 0);
+    for axis in 0..3 {
+        let mut centre = seen.row_mut(axis);
+        centre += cross.row(POSITION + axis);
+        let mut size = seen.row_mut(3 + axis);
+        size += cross.row(SIZE + axis);
     }
     seen
 }
@@ -255,9 +270,9 @@ mod tests {
         let mut position = Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random)) * 20.0;
         let mut velocity = Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random));
         let mut size = Vector3::from_element(1.0) + Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random));
-        let mut error = normal(random, &slow);
+        let root = slow.cholesky().unwrap().l();
+        let mut error = normal(random, &Matrix6::identity());
         let mut filter = diffuse();
-        filter.forget_error(&slow);
         let mut nis = 0.0;
         for sweep in 0..sweeps {
             if sweep > 0 {
@@ -273,12 +288,15 @@ mod tests {
                     size[axis] += step * MOTION.size_walk_m * dt_s.sqrt();
                 }
                 let kept = (-dt_s / MOTION.error_s).exp();
-                error = error * kept + normal(random, &(slow * (1.0 - kept * kept)));
-                filter.predict(dt_s, &MOTION, &slow);
+                error = error * kept + normal(random, &Matrix6::from_diagonal_element(1.0 - kept * kept));
+                filter.predict(dt_s, &MOTION);
             }
-            let noise = error + normal(random, &white);
+            // The view changes, and with it how wrong a fit may be.
+            let scale = 1.0 + 0.5 * (sweep % 4) as f64;
+            let (slow_root, white) = (root * scale, white * (scale * scale));
+            let noise = slow_root * error + normal(random, &white);
             let value = Vector6::from_fn(|row, _| noise[row] + if row < 3 { position[row] } else { size[row - 3] });
-            nis += filter.update(&Measured { value, sized: true, slow, white }).unwrap();
+            nis += filter.update(&Measured { value, sized: true, slow_root, white }).unwrap();
         }
         let mut wrong = Vector6::zeros();
         wrong.fixed_rows_mut::<3>(0).copy_from(&(filter.position_m() - position));
@@ -312,15 +330,15 @@ mod tests {
         let velocity = Vector3::new(0.7, -0.4, 0.1);
         let mut filter = diffuse();
         let (slow, white) = (typical() * 0.6, typical() * 0.4);
-        filter.forget_error(&slow);
+        let slow_root = slow.cholesky().unwrap().l();
         let still = Motion { velocity_walk_mps: 0.0, ..MOTION };
         for sweep in 0..50 {
             if sweep > 0 {
-                filter.predict(0.1, &still, &slow);
+                filter.predict(0.1, &still);
             }
             let centre = velocity * (0.1 * f64::from(sweep));
             let value = Vector6::new(centre.x, centre.y, centre.z, 2.0, 1.5, 1.0);
-            filter.update(&Measured { value, sized: true, slow, white }).unwrap();
+            filter.update(&Measured { value, sized: true, slow_root, white }).unwrap();
         }
         assert!((filter.velocity_mps() - velocity).norm() < 1e-3);
         assert!((filter.position_m() - velocity * 4.9).norm() < 1e-3);
@@ -333,7 +351,7 @@ mod tests {
         let white = Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e4, 1e4, 1e4));
         let before = (filter.size_m(), filter.size_covariance());
         let value = Vector6::new(1.0, 2.0, 3.0, f64::NAN, f64::NAN, f64::NAN);
-        filter.update(&Measured { value, sized: false, slow: Matrix6::zeros(), white }).unwrap();
+        filter.update(&Measured { value, sized: false, slow_root: Matrix6::zeros(), white }).unwrap();
         assert_eq!(filter.size_m(), before.0);
         assert!((filter.size_covariance() - before.1).abs().max() < 1e-3);
         assert!((filter.position_m() - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-3);
@@ -345,7 +363,7 @@ mod tests {
         let measured = Measured {
             value: Vector6::zeros(),
             sized: true,
-            slow: Matrix6::zeros(),
+            slow_root: Matrix6::zeros(),
             white: Matrix6::identity() * -1e9,
         };
         assert_eq!(filter.update(&measured), None);
@@ -376,13 +394,13 @@ mod tests {
             let mut filter = diffuse();
             for round in 0..5 {
                 for (covariance, share, value, dt_s, forget) in &steps {
-                    let slow = covariance * *share;
+                    let slow_root = (covariance * *share + Matrix6::identity() * 1e-9).cholesky().unwrap().l();
                     let white = covariance * (1.0 - share) + Matrix6::identity() * 1e-6;
-                    filter.predict(*dt_s, &MOTION, &slow);
+                    filter.predict(*dt_s, &MOTION);
                     if *forget {
-                        filter.forget_error(&slow);
+                        filter.doubt_error(dt_s.abs());
                     }
-                    let measured = Measured { value: Vector6::from(*value), sized: round % 2 == 0, slow, white };
+                    let measured = Measured { value: Vector6::from(*value), sized: round % 2 == 0, slow_root, white };
                     prop_assert!(filter.update(&measured).is_some());
                     prop_assert!(filter.is_positive_definite());
                 }

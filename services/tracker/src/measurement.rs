@@ -1,6 +1,5 @@
-use lidar::ObstacleClass;
 use messages::{SOLID_PARAMETERS, Solid};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::filter::Measured;
 use crate::params::{CentroidParams, FitParams};
@@ -14,57 +13,67 @@ const LEAST_M2: f64 = 1e-6;
 /// Places of centre and size among a solid's parameters.
 const PLACES: [usize; 6] = [0, 1, 2, 6, 7, 8];
 
-/// A body axis of each extent, longest extent first.
+/// Which body axis of a solid each of the track's extents is along.
 pub(crate) type AxisOrder = [usize; 3];
 
-/// Axes of a solid from the longest extent to the shortest; of equals the first.
-pub(crate) fn axis_order(size_m: &[f32; 3]) -> AxisOrder {
-    let mut order = [0, 1, 2];
-    // Three items are sorted in place.
-    order.sort_by(|&a, &b| size_m[b].total_cmp(&size_m[a]));
-    order
+const ORDERS: [AxisOrder; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// Names the axes of a solid as the track does: those that lie nearest to where the track's axes lay. Two fits of a body
+/// may name its axes differently.
+pub(crate) fn axis_order(attitude: &UnitQuaternion<f64>, axes: Option<&Matrix3<f64>>) -> AxisOrder {
+    let Some(axes) = axes else { return ORDERS[0] };
+    let along = axes.transpose() * attitude.to_rotation_matrix().matrix();
+    let agreement = |order: &AxisOrder| (0..3).map(|axis| along[(axis, order[axis])].abs()).sum::<f64>();
+    let best = ORDERS.iter().max_by(|a, b| agreement(a).total_cmp(&agreement(b)));
+    best.copied().unwrap_or(ORDERS[0])
 }
 
-/// What a fitted solid measures: its centre in the tracks' frame, and its extents from the longest to the shortest.
+/// A measurement and its whole covariance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Whole {
+    value: Vector6<f64>,
+    sized: bool,
+    covariance: Matrix6<f64>,
+}
+
+/// What a fitted solid measures: its centre in the tracks' frame, and its extents in the order of the track's axes.
 ///
-/// The fit's own covariance, scaled, and a floor that grows with the obstacle. A covariance without a root counts as its
+/// The fit's own covariance, scaled, and a floor that falls with the number of returns. A covariance without a root counts as its
 /// diagonal.
-pub(crate) fn of_solid(solid: &Solid, sighting: &Sighting, half_m: f64, params: &FitParams) -> Measured {
-    let order = axis_order(&solid.size_m);
+pub(crate) fn of_solid(
+    solid: &Solid,
+    order: &AxisOrder,
+    sighting: &Sighting,
+    half_m: f64,
+    params: &FitParams,
+) -> Whole {
     let places = PLACES.map(|place| if place < 3 { place } else { 6 + order[place - 6] });
     debug_assert!(places.iter().all(|&place| place < SOLID_PARAMETERS));
     let bounded = |value: f32| f64::from(value).clamp(-UNKNOWN_M * UNKNOWN_M, UNKNOWN_M * UNKNOWN_M);
-    let own = Matrix6::from_fn(|row, column| bounded(solid.covariance_of(places[row], places[column])));
-    let floor = (params.sigma_m.powi(2) + (params.relative_sigma * half_m).powi(2)).max(LEAST_M2);
+    let root = params.size_scale.sqrt();
+    let times = |place: usize| if place < 3 { 1.0 } else { root };
+    let own = Matrix6::from_fn(|row, column| {
+        times(row) * times(column) * bounded(solid.covariance_of(places[row], places[column]))
+    });
+    let floor = (params.sigma_m.powi(2) + (params.few_sigma * half_m / sighting.points.max(1.0)).powi(2)).max(LEAST_M2);
     let floor = Matrix6::from_diagonal_element(floor);
-    let mut covariance = own * params.covariance_scale + floor;
+    let scale = params.covariance_scale * (1.0 + params.few_points / sighting.points.max(1.0));
+    let mut covariance = own * scale + floor;
     if covariance.cholesky().is_none() {
         let diagonal = own.diagonal().map(|variance| variance.max(0.0));
-        covariance = Matrix6::from_diagonal(&diagonal) * params.covariance_scale + floor;
+        covariance = Matrix6::from_diagonal(&diagonal) * scale + floor;
     }
     // Centre turned into the tracks' frame; extents are the body's own.
     let mut turn = Matrix6::identity();
     turn.fixed_view_mut::<3, 3>(0, 0).copy_from(sighting.pose.attitude.to_rotation_matrix().matrix());
     let covariance = turn * covariance * turn.transpose();
-    let covariance = (covariance + covariance.transpose()) * 0.5;
     let centre = sighting.pose.place(&Vector3::from(solid.centre_m).cast());
     let extent = |place: usize| f64::from(solid.size_m[order[place]]);
-    Measured {
+    Whole {
         value: Vector6::new(centre.x, centre.y, centre.z, extent(0), extent(1), extent(2)),
         sized: true,
-        slow: covariance * params.slow_share,
-        white: covariance * (1.0 - params.slow_share),
+        covariance: (covariance + covariance.transpose()) * 0.5,
     }
-}
-
-/// A solid of another class than the obstacle's: its centre is one of the right body only roughly, its extents are none.
-pub(crate) fn as_foreign(measured: &mut Measured, half_m: f64, params: &FitParams) {
-    let variance = (params.foreign_sigma * half_m).powi(2);
-    for axis in 0..3 {
-        measured.slow[(axis, axis)] += variance * params.slow_share;
-        measured.white[(axis, axis)] += variance * (1.0 - params.slow_share);
-    }
-    unsize(measured);
 }
 
 /// What the mean of the visible returns measures: the centre lies behind it, along the line of sight, by a share of the
@@ -75,22 +84,60 @@ pub(crate) fn of_centroid(
     half_sigma_m: f64,
     torn: bool,
     params: &CentroidParams,
-) -> Measured {
+) -> Whole {
     let depth = depth(sighting.points, params);
     let centre = sighting.centroid_m + sighting.line_of_sight * (depth * half_m);
     let half_m = if torn { half_m.max(sighting.half_width_m) } else { half_m };
     let along = sighting.line_of_sight * sighting.line_of_sight.transpose() * (depth * half_sigma_m).powi(2);
-    let covariance = Matrix3::identity() * spread(sighting.points, half_m, torn, params) + along;
-    let mut measured = Measured {
-        value: Vector6::new(centre.x, centre.y, centre.z, 0.0, 0.0, 0.0),
-        sized: false,
-        slow: Matrix6::identity() * LEAST_M2,
-        white: Matrix6::zeros(),
-    };
-    measured.slow.fixed_view_mut::<3, 3>(0, 0).copy_from(&(covariance * params.slow_share));
-    measured.white.fixed_view_mut::<3, 3>(0, 0).copy_from(&(covariance * (1.0 - params.slow_share)));
-    unsize(&mut measured);
-    measured
+    let place = Matrix3::identity() * spread(sighting.points, half_m, torn, params) + along;
+    let mut covariance = Matrix6::identity();
+    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&place);
+    Whole { value: Vector6::new(centre.x, centre.y, centre.z, 0.0, 0.0, 0.0), sized: false, covariance }
+}
+
+impl Whole {
+    /// A solid of another class than the obstacle's: its centre is one of the right body only roughly, its extents are
+    /// none.
+    pub(crate) fn foreign(mut self, half_m: f64, params: &FitParams) -> Self {
+        let place: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(0, 0).into();
+        let wider = place + Matrix3::from_diagonal_element((params.foreign_sigma * half_m).powi(2));
+        self.covariance = Matrix6::identity();
+        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&wider);
+        self.sized = false;
+        self
+    }
+
+    /// Variance of the centre, over all axes [m²].
+    pub(crate) fn place_m2(&self) -> f64 {
+        self.covariance.fixed_view::<3, 3>(0, 0).trace()
+    }
+
+    /// Parts the error. What is new each time is a share of the variance, and no more than `most_m` wide along any axis:
+    /// what a view does not show, the next one does not show either.
+    pub(crate) fn parted(&self, slow_share: f64, most_m: f64) -> Measured {
+        let bound = Matrix6::from_diagonal_element(most_m * most_m);
+        // (C⁻¹ + B⁻¹)⁻¹ = C − C (C + B)⁻¹ C.
+        let within = (self.covariance + bound)
+            .cholesky()
+            .map_or(self.covariance, |sum| self.covariance - self.covariance * sum.solve(&self.covariance));
+        let within = (within + within.transpose()) * (0.5 * (1.0 - slow_share));
+        let slow = self.covariance - within;
+        let root = slow.cholesky().map_or_else(
+            || Matrix6::from_diagonal(&slow.diagonal().map(|variance| variance.max(0.0).sqrt())),
+            |root| root.l(),
+        );
+        let white = within + Matrix6::from_diagonal_element(LEAST_M2);
+        let mut measured = Measured { value: self.value, sized: self.sized, slow_root: root, white };
+        if !self.sized {
+            for place in 3..6 {
+                measured.slow_root.row_mut(place).fill(0.0);
+                measured.white.row_mut(place).fill(0.0);
+                measured.white.column_mut(place).fill(0.0);
+                measured.white[(place, place)] = UNKNOWN_M * UNKNOWN_M;
+            }
+        }
+        measured
+    }
 }
 
 /// How far behind the mean of some returns the centre is, in half extents: a single return may be anywhere.
@@ -111,24 +158,6 @@ pub(crate) fn blur(measured: &mut Measured, velocity: &Vector3<f64>, uncertain: 
     let mut white = measured.white.fixed_view_mut::<3, 3>(0, 0);
     white += moved;
 }
-
-/// Leaves the extents out.
-fn unsize(measured: &mut Measured) {
-    measured.sized = false;
-    for place in 3..6 {
-        for other in 0..6 {
-            for matrix in [&mut measured.slow, &mut measured.white] {
-                matrix[(place, other)] = 0.0;
-                matrix[(other, place)] = 0.0;
-            }
-        }
-        measured.slow[(place, place)] = LEAST_M2;
-        measured.white[(place, place)] = UNKNOWN_M * UNKNOWN_M;
-    }
-}
-
-/// Which error a measurement has: of a solid of that class, or, for `Unclassified`, of a centroid.
-pub(crate) type Kind = ObstacleClass;
 
 #[cfg(test)]
 mod tests {
@@ -160,19 +189,36 @@ mod tests {
     }
 
     #[test]
-    fn extents_are_measured_from_the_longest_to_the_shortest_with_their_own_covariances() {
+    fn extents_are_measured_in_the_order_of_the_tracks_axes_with_their_own_covariances() {
         let params = params().fit;
-        let measured = of_solid(&solid(), &sighting(9, &EgoMotion::default()), 1.0, &params);
+        let measured = of_solid(&solid(), &[1, 2, 0], &sighting(9, &EgoMotion::default()), 1.0, &params);
         assert_eq!(measured.value, Vector6::new(11.0, 0.0, 0.0, 3.0, 2.0, 1.0));
-        let whole = measured.slow + measured.white;
-        let floor = params.sigma_m.powi(2) + params.relative_sigma.powi(2);
+        let floor = params.sigma_m.powi(2) + (params.few_sigma / 9.0).powi(2);
+        let scale = params.covariance_scale * (1.0 + params.few_points / 9.0);
         // Extents y, z, x are parameters 7, 8, 6.
         for (place, parameter) in [(3, 7), (4, 8), (5, 6)] {
-            let own = f64::from(solid().covariance_of(parameter, parameter));
-            assert!((whole[(place, place)] - own * params.covariance_scale - floor).abs() < 1e-9);
+            let own = f64::from(solid().covariance_of(parameter, parameter)) * scale;
+            assert!((measured.covariance[(place, place)] - own * params.size_scale - floor).abs() < 1e-6);
         }
-        let mixed = f64::from(solid().covariance_of(0, 7)) * params.covariance_scale;
-        assert!((whole[(0, 3)] - mixed).abs() < 1e-9 && (whole[(3, 0)] - mixed).abs() < 1e-9);
+        let mixed = f64::from(solid().covariance_of(0, 7)) * scale * params.size_scale.sqrt();
+        assert!((measured.covariance[(0, 3)] - mixed).abs() < 1e-9);
+    }
+
+    // verifies TRA-025
+    #[test]
+    fn axes_keep_their_names_whatever_a_fit_calls_them() {
+        let attitude = UnitQuaternion::from_euler_angles(0.3, -0.5, 1.0);
+        let axes = *attitude.to_rotation_matrix().matrix();
+        assert_eq!(axis_order(&attitude, None), [0, 1, 2]);
+        // A turn of 5°, and the axes named x → y → z → x.
+        let small = UnitQuaternion::from_scaled_axis(Vector3::new(0.05, 0.05, -0.05));
+        let cyclic = UnitQuaternion::from_scaled_axis(Vector3::repeat(std::f64::consts::TAU / 3.0 / 3.0_f64.sqrt()));
+        let named = small * attitude * cyclic;
+        let order = axis_order(&named, Some(&axes));
+        for axis in 0..3 {
+            let found = named.to_rotation_matrix().matrix().column(order[axis]).dot(&axes.column(axis));
+            assert!(found.abs() > 0.9, "{order:?}");
+        }
     }
 
     #[test]
@@ -181,20 +227,33 @@ mod tests {
         // A quarter turn about z: the sensor's x is the frame's y.
         let ego = EgoMotion { attitude_wxyz: [half, 0.0, 0.0, half], known: 1, ..EgoMotion::default() };
         let params = params().fit;
-        let level = of_solid(&solid(), &sighting(9, &EgoMotion::default()), 1.0, &params);
-        let turned = of_solid(&solid(), &sighting(9, &ego), 1.0, &params);
+        let level = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params);
+        let turned = of_solid(&solid(), &[0, 1, 2], &sighting(9, &ego), 1.0, &params);
         assert!((turned.value.fixed_rows::<3>(0) - Vector3::new(0.0, 11.0, 0.0)).norm() < 1e-9);
-        assert!((turned.white[(1, 1)] - level.white[(0, 0)]).abs() < 1e-9);
-        assert!((turned.white[(1, 4)] - level.white[(0, 4)]).abs() < 1e-9);
+        assert!((turned.covariance[(1, 1)] - level.covariance[(0, 0)]).abs() < 1e-9);
+        assert!((turned.covariance[(1, 4)] - level.covariance[(0, 4)]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn both_parts_of_an_error_make_all_of_it_and_what_is_new_is_bounded() {
+        let whole = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params().fit);
+        let parted = whole.parted(0.4, 0.05);
+        let sum = parted.slow_root * parted.slow_root.transpose() + parted.white;
+        assert!((sum - whole.covariance).abs().max() < 2e-6);
+        assert!(parted.white.diagonal().max() < 0.05 * 0.05);
+        let narrow = Whole { covariance: Matrix6::from_diagonal_element(1e-4), ..whole }.parted(0.4, 10.0);
+        assert!((narrow.white[(0, 0)] - 0.6e-4).abs() < 2e-6);
     }
 
     #[test]
     fn a_covariance_that_is_none_is_measured_all_the_same() {
         let odd = [[0.0; 45], [-1.0; 45], [1e30; 45], std::array::from_fn(|place| if place == 1 { 5.0 } else { 0.0 })];
         for covariance in odd {
-            let measured =
-                of_solid(&Solid { covariance, ..solid() }, &sighting(9, &EgoMotion::default()), 1.0, &params().fit);
-            assert!(measured.white.cholesky().is_some(), "{covariance:?}");
+            let solid = Solid { covariance, ..solid() };
+            let whole = of_solid(&solid, &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params().fit);
+            let parted = whole.parted(0.4, 0.05);
+            assert!(parted.white.cholesky().is_some(), "{covariance:?}");
+            assert!(parted.slow_root.iter().all(|one| one.is_finite()));
         }
     }
 
@@ -207,9 +266,9 @@ mod tests {
         assert_eq!((many.value.y, many.value.z, many.sized), (0.0, 0.0, false));
         let one = of_centroid(&sighting(1, &EgoMotion::default()), 2.0, 0.0, false, &params);
         assert_eq!(one.value.x, 10.0);
-        assert!(one.white[(0, 0)] > many.white[(0, 0)]);
+        assert!(one.place_m2() > many.place_m2());
         let torn = of_centroid(&sighting(1_000, &EgoMotion::default()), 2.0, 0.0, true, &params);
-        assert!(torn.white[(1, 1)] > many.white[(1, 1)]);
+        assert!(torn.covariance[(1, 1)] > many.covariance[(1, 1)]);
     }
 
     #[test]
@@ -217,16 +276,17 @@ mod tests {
         let params = params().centroid;
         let sure = of_centroid(&sighting(100, &EgoMotion::default()), 1.0, 0.0, false, &params);
         let unsure = of_centroid(&sighting(100, &EgoMotion::default()), 1.0, 0.5, false, &params);
-        assert!(unsure.white[(0, 0)] > sure.white[(0, 0)]);
-        assert_eq!(unsure.white[(1, 1)], sure.white[(1, 1)]);
+        assert!(unsure.covariance[(0, 0)] > sure.covariance[(0, 0)]);
+        assert_eq!(unsure.covariance[(1, 1)], sure.covariance[(1, 1)]);
     }
 
     #[test]
     fn a_foreign_solid_tells_no_extents_and_its_centre_roughly() {
         let params = params();
-        let mut measured = of_solid(&solid(), &sighting(9, &EgoMotion::default()), 1.0, &params.fit);
-        let before = measured.white[(0, 0)];
-        as_foreign(&mut measured, 1.0, &params.fit);
-        assert!(!measured.sized && measured.white[(0, 0)] > before && measured.white[(0, 3)] == 0.0);
+        let own = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params.fit);
+        let foreign = own.foreign(1.0, &params.fit);
+        assert!(!foreign.sized && foreign.place_m2() > own.place_m2());
+        let parted = foreign.parted(0.4, 0.05);
+        assert_eq!((parted.slow_root[(3, 3)], parted.white[(3, 3)]), (0.0, UNKNOWN_M * UNKNOWN_M));
     }
 }

@@ -1,4 +1,3 @@
-use nalgebra::Vector3;
 use serde::Deserialize;
 
 use crate::spin::SpinParams;
@@ -35,8 +34,8 @@ pub struct BirthParams {
     pub min_points: u32,
     /// Standard deviation of an unknown velocity along each axis [m/s].
     pub velocity_sigma_mps: f64,
-    /// Mean extents of an unknown obstacle, longest first [m].
-    pub size_m: [f64; 3],
+    /// Extent of an unknown obstacle along any axis [m].
+    pub size_m: f64,
     /// Standard deviation of each [m].
     pub size_sigma_m: f64,
 }
@@ -57,18 +56,26 @@ pub struct MotionParams {
 pub struct FitParams {
     /// Times the fit's own covariance.
     pub covariance_scale: f64,
+    /// Returns at which that factor is doubled: fits of few returns are surer than they are right.
+    pub few_points: f64,
+    /// Times the covariance of its extents, beside.
+    pub size_scale: f64,
     /// Standard deviation that every fit has beside [m].
     pub sigma_m: f64,
-    /// The same, as a share of the obstacle's mean half extent.
-    pub relative_sigma: f64,
+    /// The same of a fit to a single return, as a share of the obstacle's mean half extent; falls with their number.
+    pub few_sigma: f64,
     /// Share of the variance that lasts from sweep to sweep, 0 to 1.
     pub slow_share: f64,
+    /// Most standard deviation of what does not last [m]: what one view does not show, the next does not show either.
+    pub white_sigma_m: f64,
     /// Time after which the lasting error has fallen to 1/e [s].
     pub slow_s: f64,
     /// Degrees of freedom of Student's t, by which fits far from what is expected count less.
     pub degrees_of_freedom: f64,
-    /// Squared Mahalanobis distance beyond which a fit has jumped to another minimum: its lasting error is a new one.
+    /// Squared Mahalanobis distance beyond which a fit has jumped to another minimum, with another lasting error.
     pub jump: f64,
+    /// Jumps in a row after which it is the track that is wrong, and the fits are believed.
+    pub patience: u32,
     /// Standard deviation of a centre that was fitted as another class than the track's, as a share of the half extent.
     pub foreign_sigma: f64,
     /// A class is the track's as long as its posterior is at least this.
@@ -89,6 +96,8 @@ pub struct CentroidParams {
     pub torn_sigma: f64,
     /// Share of the variance that lasts from sweep to sweep, 0 to 1.
     pub slow_share: f64,
+    /// Means of returns are used only where their variance is less than so many times that of the track.
+    pub worth: f64,
 }
 
 /// `[association]`.
@@ -161,9 +170,6 @@ pub enum ParamsError {
         /// Most that is accepted.
         highest: f64,
     },
-    /// Longest first.
-    #[error("birth.size_m is {0:?}, must fall from the longest to the shortest")]
-    Sizes([f64; 3]),
     /// More hits than sweeps.
     #[error("lifecycle.confirm_hits is {hits}, must be at most confirm_sweeps, {sweeps}")]
     Confirm {
@@ -186,10 +192,6 @@ impl Params {
                 return Err(ParamsError::Range { key, value, lowest, highest });
             }
         }
-        let [longest, middle, shortest] = self.birth.size_m;
-        if longest < middle || middle < shortest {
-            return Err(ParamsError::Sizes(self.birth.size_m));
-        }
         let LifecycleParams { confirm_hits: hits, confirm_sweeps: sweeps, .. } = self.lifecycle;
         if hits > sweeps {
             return Err(ParamsError::Confirm { hits, sweeps });
@@ -198,21 +200,24 @@ impl Params {
     }
 
     /// Each key with its value and the range that it must be in.
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 48] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 51] {
         let Self { birth, motion, fit, centroid, association, lifecycle, class, spin, danger } = self;
         [
             ("birth.min_points", f64::from(birth.min_points), 1.0, 1e5),
             ("birth.velocity_sigma_mps", birth.velocity_sigma_mps, 1e-3, 1e4),
-            ("birth.size_m", birth.size_m[0], 0.01, 100.0),
-            ("birth.size_m", birth.size_m[1], 0.01, 100.0),
-            ("birth.size_m", birth.size_m[2], 0.01, 100.0),
+            ("birth.size_m", birth.size_m, 0.01, 100.0),
             ("birth.size_sigma_m", birth.size_sigma_m, 0.01, 100.0),
             ("motion.velocity_walk_mps", motion.velocity_walk_mps, 0.0, 1e3),
             ("motion.size_walk_m", motion.size_walk_m, 0.0, 10.0),
             ("fit.covariance_scale", fit.covariance_scale, 0.01, 100.0),
+            ("fit.few_points", fit.few_points, 0.0, 1e5),
+            ("fit.size_scale", fit.size_scale, 0.01, 1e4),
             ("fit.sigma_m", fit.sigma_m, 1e-3, 10.0),
-            ("fit.relative_sigma", fit.relative_sigma, 0.0, 10.0),
+            ("fit.few_sigma", fit.few_sigma, 0.0, 100.0),
             ("fit.slow_share", fit.slow_share, 0.0, 0.99),
+            ("fit.white_sigma_m", fit.white_sigma_m, 1e-3, 100.0),
+            ("fit.patience", f64::from(fit.patience), 1.0, 1e6),
+            ("centroid.worth", centroid.worth, 0.0, 1e6),
             ("fit.slow_s", fit.slow_s, 1e-3, 1e3),
             ("fit.degrees_of_freedom", fit.degrees_of_freedom, 1.0, 1e6),
             ("fit.jump", fit.jump, 1.0, 1e6),
@@ -250,13 +255,6 @@ impl Params {
             ("danger.horizon_s", danger.horizon_s, 0.0, 1e4),
             ("danger.alert_probability", danger.alert_probability, 0.0, 1.0),
         ]
-    }
-}
-
-impl BirthParams {
-    /// Mean extents, longest first [m].
-    pub(crate) fn size(&self) -> Vector3<f64> {
-        self.size_m.into()
     }
 }
 
@@ -299,10 +297,9 @@ mod tests {
             let whole = ["min_points", "confirm_hits", "confirm_sweeps", "lost_misses", "patience"]
                 .iter()
                 .any(|end| key.ends_with(end));
-            let bad = match (whole, key.as_str()) {
-                (true, _) => vec![toml::Value::Integer(0), toml::Value::Integer(4_000_000_000)],
-                (_, "birth.size_m") => vec![toml::Value::Array(vec![toml::Value::Float(0.0); 3])],
-                _ => [-1.0, 1e9, f64::NAN].map(toml::Value::Float).to_vec(),
+            let bad = match whole {
+                true => vec![toml::Value::Integer(0), toml::Value::Integer(4_000_000_000)],
+                false => [-1.0, 1e9, f64::NAN].map(toml::Value::Float).to_vec(),
             };
             for value in bad {
                 let refused = with(&key, value).unwrap_err();
@@ -312,9 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_rise_and_more_hits_than_sweeps_are_refused() {
-        let sizes = toml::Value::Array([1.0, 2.0, 1.0].map(toml::Value::Float).to_vec());
-        assert!(with("birth.size_m", sizes).unwrap_err().contains("must fall from the longest"));
+    fn more_hits_than_sweeps_are_refused() {
         let refused = with("lifecycle.confirm_hits", toml::Value::Integer(6)).unwrap_err();
         assert_eq!(refused, "lifecycle.confirm_hits is 6, must be at most confirm_sweeps, 5");
     }

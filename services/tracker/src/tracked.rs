@@ -1,11 +1,12 @@
+use lidar::ObstacleClass;
 use messages::{Detection, Solid};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::class::Belief;
-use crate::filter::{Filter, Motion};
+use crate::filter::{Filter, Measured, Motion};
 use crate::frame::seconds;
 use crate::lifecycle::Life;
-use crate::measurement::{AxisOrder, Kind, as_foreign, axis_order, blur, of_centroid, of_solid};
+use crate::measurement::{AxisOrder, axis_order, blur, of_centroid, of_solid};
 use crate::params::Params;
 use crate::sighting::Sighting;
 use crate::spin::{AttitudeFit, SpinFilter, SpinParams};
@@ -27,8 +28,8 @@ pub(crate) struct Tracked {
     pub(crate) filter_ns: u64,
     /// Sensor time at which it was last seen, measured or not [ns].
     pub(crate) seen_ns: u64,
-    /// Whose error the filter reckons with.
-    kind: Kind,
+    /// Fits in a row that were far from what was expected.
+    jumps: u32,
     /// The last solid that was fitted.
     pub(crate) solid: Option<Attitude>,
     /// How it turns; none before the first fit that tells.
@@ -40,8 +41,16 @@ pub(crate) struct Tracked {
 pub(crate) struct Attitude {
     /// Rotation from body to the tracks' frame.
     pub(crate) attitude: UnitQuaternion<f64>,
-    /// Which body axis has which of the extents.
+    /// Which body axis each of the track's extents is along.
     pub(crate) order: AxisOrder,
+}
+
+impl Attitude {
+    /// The axes of the track's extents in the tracks' frame, column by column; their signs mean nothing.
+    fn axes(&self) -> Matrix3<f64> {
+        let all = self.attitude.to_rotation_matrix();
+        Matrix3::from_fn(|row, axis| all[(row, self.order[axis])])
+    }
 }
 
 impl Tracked {
@@ -51,7 +60,7 @@ impl Tracked {
         let own = params.birth.velocity_sigma_mps;
         // At rest, or along with the sensor: whatever is between.
         let velocity = Matrix3::identity() * (own * own) + frame.velocity_mps * frame.velocity_mps.transpose();
-        let mean = [sighting.centroid_m, Vector3::zeros(), params.birth.size()];
+        let mean = [sighting.centroid_m, Vector3::zeros(), Vector3::repeat(params.birth.size_m)];
         let mut tracked = Self {
             id,
             life: Life::born(sweep.number, &params.lifecycle),
@@ -59,7 +68,7 @@ impl Tracked {
             filter: Filter::new(mean, ANYWHERE_M, velocity, params.birth.size_sigma_m),
             filter_ns: sighting.time_ns,
             seen_ns: sighting.time_ns,
-            kind: Kind::Unclassified,
+            jumps: 0,
             solid: None,
             spin: None,
         };
@@ -85,45 +94,42 @@ impl Tracked {
         let solid = gathered.solid(sighting.detection);
         let half_m = self.half_m();
         let solid = solid.filter(|_| !torn);
-        let (mut measured, kind, error_s) = match solid {
-            Some(solid) => (of_solid(solid, sighting, half_m, &params.fit), detection.class, params.fit.slow_s),
+        let foreign = solid.is_some() && self.is_foreign(detection, params);
+        let lies = solid.map(|solid| self.lie(solid, sighting));
+        let whole = match solid.zip(lies) {
+            Some((solid, lies)) => {
+                let whole = of_solid(solid, &lies.order, sighting, half_m, &params.fit);
+                if foreign { whole.foreign(half_m, &params.fit) } else { whole }
+            }
             None => {
                 let half_sigma_m = (self.filter.size_covariance().trace() / 3.0).sqrt() / 2.0;
-                let measured = of_centroid(sighting, half_m, half_sigma_m, torn, &params.centroid);
-                (measured, Kind::Unclassified, params.fit.slow_s)
+                of_centroid(sighting, half_m, half_sigma_m, torn, &params.centroid)
             }
         };
-        let foreign = solid.is_some() && self.is_foreign(detection, params);
-        if foreign {
-            as_foreign(&mut measured, half_m, &params.fit);
-        }
+        let share = if solid.is_some() { params.fit.slow_share } else { params.centroid.slow_share };
+        let mut measured = whole.parted(share, params.fit.white_sigma_m);
         if sighting.time_sigma_s > 0.0 {
             blur(&mut measured, &self.filter.velocity_mps(), &self.filter.velocity_covariance(), sighting.time_sigma_s);
         }
-        let motion = Motion {
-            velocity_walk_mps: params.motion.velocity_walk_mps,
-            size_walk_m: params.motion.size_walk_m,
-            error_s,
-        };
-        self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion, &measured.slow);
-        self.filter_ns = sighting.time_ns;
         self.seen_ns = sighting.time_ns;
-        // Another solid has another error.
-        let fresh = first || kind != self.kind;
-        self.kind = kind;
-        if fresh {
-            self.filter.forget_error(&measured.slow);
+        let known_m2 = self.spread_m2(sighting.time_ns, params).trace();
+        // Returns alone tell nothing new of a place that is known much better.
+        if first || solid.is_some() || whole.place_m2() < params.centroid.worth * known_m2 {
+            let motion = Motion {
+                velocity_walk_mps: params.motion.velocity_walk_mps,
+                size_walk_m: params.motion.size_walk_m,
+                error_s: params.fit.slow_s,
+            };
+            self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion);
+            self.filter_ns = sighting.time_ns;
+            let trust = if first { 1.0 } else { self.weigh(&mut measured, params) };
+            // A sum without a root changes nothing: the track goes on as predicted.
+            let _ = self.filter.update(&measured);
+            self.belief.add(&detection.posterior, trust, &params.class);
         }
-        let trust = if first { 1.0 } else { self.weigh(&mut measured, fresh, params) };
-        // A sum without a root changes nothing: the track goes on as predicted.
-        let _ = self.filter.update(&measured);
-        self.belief.add(&detection.posterior, trust, &params.class);
-        if let Some(solid) = solid.filter(|_| !foreign) {
-            let [w, x, y, z] = solid.attitude_wxyz.map(f64::from);
-            let body = nalgebra::Quaternion::new(w, x, y, z);
-            let body = UnitQuaternion::try_new(body, 1e-6).unwrap_or_else(UnitQuaternion::identity);
-            let attitude = sighting.pose.attitude * body;
-            self.solid = Some(Attitude { attitude, order: axis_order(&solid.size_m) });
+        if let Some((solid, lies)) = solid.zip(lies).filter(|_| !foreign) {
+            self.solid = Some(lies);
+            let attitude = lies.attitude;
             if detection.summary.points >= params.spin.min_points {
                 self.turn(solid, detection.class, sighting, attitude, &params.spin);
             }
@@ -134,7 +140,7 @@ impl Tracked {
     fn turn(
         &mut self,
         solid: &Solid,
-        class: Kind,
+        class: ObstacleClass,
         sighting: &Sighting,
         attitude: UnitQuaternion<f64>,
         params: &SpinParams,
@@ -157,26 +163,45 @@ impl Tracked {
         }
     }
 
-    /// Student's t: what is far from what is expected counts less, and beyond a bound it has jumped, and has an error of
-    /// its own. Gives the weight, 0 to 1.
-    fn weigh(&mut self, measured: &mut crate::filter::Measured, fresh: bool, params: &Params) -> f64 {
+    /// How a solid lies, its axes named as the track names them.
+    fn lie(&self, solid: &Solid, sighting: &Sighting) -> Attitude {
+        let [w, x, y, z] = solid.attitude_wxyz.map(f64::from);
+        let body = UnitQuaternion::try_new(nalgebra::Quaternion::new(w, x, y, z), 1e-6);
+        let attitude = sighting.pose.attitude * body.unwrap_or_else(UnitQuaternion::identity);
+        let before = self.solid.map(|solid| solid.axes());
+        Attitude { attitude, order: axis_order(&attitude, before.as_ref()) }
+    }
+
+    /// Student's t: what is far from what is expected counts less, and beyond a bound it has jumped, and may have another
+    /// lasting error. Where nothing but jumps comes, it is the track that is wrong. Gives the weight, 0 to 1.
+    fn weigh(&mut self, measured: &mut Measured, params: &Params) -> f64 {
         let distance = self.filter.distance(measured);
         let freedom = if measured.sized { 6.0 } else { 3.0 };
         let excess = (params.fit.degrees_of_freedom + distance) / (params.fit.degrees_of_freedom + freedom);
-        if !(excess > 1.0 && excess.is_finite()) {
-            return 1.0;
+        if !excess.is_finite() {
+            return 0.0;
         }
-        measured.white *= excess;
-        if fresh || distance > params.fit.jump {
-            measured.slow *= excess;
-            self.filter.forget_error(&measured.slow);
+        if distance <= params.fit.jump {
+            self.jumps = 0;
+        } else {
+            self.jumps += 1;
+            if self.jumps >= params.fit.patience {
+                self.jumps = 0;
+                let birth = &params.birth;
+                self.filter.reopen(birth.size_sigma_m, birth.velocity_sigma_mps, birth.size_sigma_m);
+                return 1.0;
+            }
+            self.filter.doubt_error(excess);
         }
-        1.0 / excess
+        if excess > 1.0 {
+            measured.white *= excess;
+        }
+        (1.0 / excess).min(1.0)
     }
 
     /// Whether a detection is of a class that this obstacle surely has not.
     fn is_foreign(&self, detection: &Detection, params: &Params) -> bool {
-        let of = detection.class.solid_index().filter(|_| self.belief.class() != Kind::Unclassified);
+        let of = detection.class.solid_index().filter(|_| self.belief.class() != ObstacleClass::Unclassified);
         of.is_some_and(|class| self.belief.posterior()[class] < params.fit.foreign_posterior)
     }
 
