@@ -177,7 +177,7 @@ fn a_minimum_that_stays_is_believed_and_the_spin_goes_on() {
     for sweep in 40..70 {
         counted += u32::from(filter.update(&body.fit(f64::from(sweep) * 0.1), &PARAMS));
     }
-    assert_eq!(counted, 30 - u32::from(PARAMS.patience), "all but the first few");
+    assert_eq!(counted, 30 - PARAMS.patience, "all but the first few");
     assert!((filter.estimate(&PARAMS).radps - body.spin).norm() < 0.03);
 }
 
