@@ -152,6 +152,8 @@ pub struct DangerParams {
     pub horizon_s: f64,
     /// Probability of being touched within the horizon from which a track is an alert, 0 to 1.
     pub alert_probability: f64,
+    /// Age from which on a track can be an alert [sweeps]; 1 from its birth on.
+    pub alert_age_sweeps: u32,
 }
 
 /// Why the tracker cannot start.
@@ -200,7 +202,7 @@ impl Params {
     }
 
     /// Each key with its value and the range that it must be in.
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 51] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 52] {
         let Self { birth, motion, fit, centroid, association, lifecycle, class, spin, danger } = self;
         [
             ("birth.min_points", f64::from(birth.min_points), 1.0, 1e5),
@@ -254,6 +256,7 @@ impl Params {
             ("danger.own_radius_m", danger.own_radius_m, 0.0, 1e3),
             ("danger.horizon_s", danger.horizon_s, 0.0, 1e4),
             ("danger.alert_probability", danger.alert_probability, 0.0, 1.0),
+            ("danger.alert_age_sweeps", f64::from(danger.alert_age_sweeps), 1.0, 1e6),
         ]
     }
 }
@@ -294,7 +297,7 @@ mod tests {
     #[test]
     fn each_value_out_of_range_is_refused_by_name() {
         for key in keys() {
-            let whole = ["min_points", "confirm_hits", "confirm_sweeps", "lost_misses", "patience"]
+            let whole = ["min_points", "confirm_hits", "confirm_sweeps", "lost_misses", "patience", "alert_age_sweeps"]
                 .iter()
                 .any(|end| key.ends_with(end));
             let bad = match whole {

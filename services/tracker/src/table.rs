@@ -64,7 +64,8 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
         false => ClosestApproach::default(),
     };
     let spin = track.spin.map(|spin| spin.estimate(&params.spin)).unwrap_or_default();
-    let alert = f64::from(approach.collision_probability) >= params.danger.alert_probability;
+    let alert = age_sweeps >= params.danger.alert_age_sweeps
+        && f64::from(approach.collision_probability) >= params.danger.alert_probability;
     Track {
         id: track.id,
         last_seen_ns: track.seen_ns,
