@@ -94,7 +94,8 @@ fn every_stage_has_a_line_that_says_what_it_worked_on() {
         assert_stages(&lines);
         for line in &lines {
             assert_eq!((&line["sweep"], &line["n"]), (&"two-walls".into(), &72.into()), "{line}");
-            if !line["stage"].as_str().unwrap().starts_with("full_") {
+            let stage = line["stage"].as_str().unwrap();
+            if !stage.starts_with("full_") && stage != "track" {
                 assert_eq!(line["support_vectors"], lines[0]["support_vectors"], "{line}");
             }
         }

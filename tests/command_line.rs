@@ -158,14 +158,14 @@ fn a_trace_follows_every_sweep_through_every_stage() {
     assert_eq!(names, ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"]);
     for sweep in 0..5 {
         let flow = |phase: &str| of(phase).iter().filter(|event| event["id"] == sweep).count();
-        assert_eq!((flow("s"), flow("t"), flow("f")), (1, 2, 1), "sweep {sweep}");
+        assert_eq!((flow("s"), flow("t"), flow("f")), (1, 3, 1), "sweep {sweep}");
         let worked = |name: &str| of("X").iter().filter(|e| e["name"] == name && e["args"]["sweep"] == sweep).count();
         let sectors = run.report["sectors"].as_u64().unwrap() as usize;
-        assert_eq!((worked("make"), worked("process")), (sectors, 3 * sectors), "sweep {sweep}");
+        assert_eq!((worked("make"), worked("process")), (sectors, 4 * sectors), "sweep {sweep}");
     }
     assert_eq!(run.report["trace"]["events"], events.len());
     assert_eq!((&run.report["trace"]["lost"], &run.report["trace"]["missing"]), (&0.into(), &0.into()));
-    assert_eq!(run.report["worst_sweeps"][0]["hops"].as_array().unwrap().len(), 4);
+    assert_eq!(run.report["worst_sweeps"][0]["hops"].as_array().unwrap().len(), 5);
     assert!(run.stdout().contains("slowest sweeps") && run.stdout().contains("0 parts lost"), "{}", run.stdout());
     let (trace, both) = (path.to_str().unwrap(), ["--trace", "--detections"]);
     refused_in_one_line(&["run", "--detections", trace, "--trace", trace], &both);

@@ -92,7 +92,7 @@ fn the_machine_is_looked_at_from_all_sides() {
         assert!(names.contains(&name), "{name} is not among {names:?}");
     }
     let bill = report["shared_memory"].as_array().unwrap();
-    assert_eq!(bill.len(), 5, "sweeps, truth, and what three stages write");
+    assert_eq!(bill.len(), 6, "sweeps, truth, and what four stages write");
     for hop in bill {
         assert!(hop["touched_bytes"].as_u64() < hop["virtual_bytes"].as_u64(), "{hop}");
     }

@@ -75,16 +75,16 @@ fn tracks_of_a_recording_are_told_without_truth() {
     let dir = folder("");
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/scenes/reference-tumbling.toml");
     let mut simulate = encke();
-    simulate.current_dir(dir.path()).args(["simulate", "--sweeps", "20", "--out", "capture.pcap", "--scene"]);
+    simulate.current_dir(dir.path()).args(["simulate", "--sweeps", "20", "--out", "capture.mcap", "--scene"]);
     let made = simulate.arg(scene).output().unwrap();
     assert!(made.status.success(), "{}", text(&made.stderr));
-    let output = evaluate(dir.path(), &["--json", "--from", "capture.pcap", "--out", "report"]);
+    let output = evaluate(dir.path(), &["--json", "--from", "capture.mcap", "--out", "report"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let value: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(value["sweeps"].as_u64().unwrap() >= 19 && value["recording"] == "capture.pcap");
+    assert!(value["sweeps"].as_u64().unwrap() >= 19 && value["recording"] == "capture.mcap");
     assert!(value["confirmed"].as_u64().unwrap() > 20, "{value}");
     assert!(value["changed"]["per_cent"].as_f64().unwrap() < 5.0, "{value}");
-    assert!(fs::read_to_string(dir.path().join("report/tracks.html")).unwrap().contains("capture.pcap"));
+    assert!(fs::read_to_string(dir.path().join("report/tracks.html")).unwrap().contains("capture.mcap"));
 }
 
 #[test]

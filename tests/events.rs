@@ -263,7 +263,9 @@ fn prometheus_gets_the_counters_of_the_status_and_a_scraper_that_hangs_costs_not
     let answer = http(&address, "GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
     let after = run.status().unwrap();
     assert!(answer.starts_with("HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4"), "{answer}");
-    for (place, stage) in ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"].into_iter().enumerate() {
+    for (place, stage) in
+        ["source", "clusterer", "extractor", "classifier", "tracker", "recorder"].into_iter().enumerate()
+    {
         let name = format!("encke_parts_published_total{{stage=\"{stage}\"}} ");
         let seen: u64 = answer.lines().find_map(|line| line.strip_prefix(&name)).unwrap().parse().unwrap();
         let [first, last] = [&before, &after].map(|status| status["stages"][place]["published"].as_u64().unwrap());

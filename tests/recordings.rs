@@ -19,7 +19,8 @@ fn the_real_capture_has_every_sweep_and_every_return() {
     let Some(capture) = recorded(MONTEREY) else { return };
     let oracle = recorded("hdl32e/monterey_hdl32e.oracle.json").unwrap();
     let oracle: serde_json::Value = serde_json::from_slice(&std::fs::read(oracle).unwrap()).unwrap();
-    let run = Run::new(&["--from", capture.to_str().unwrap(), "--pace", "fast"]).with_all_rows().finish().expect_code(0);
+    let run =
+        Run::new(&["--from", capture.to_str().unwrap(), "--pace", "fast"]).with_all_rows().finish().expect_code(0);
     assert!(run.is_closed());
     assert_eq!(run.sweeps(), (0..19).collect::<Vec<_>>());
     let complete = run.detections.iter().filter(|line| line["complete"] == true).count();
@@ -44,7 +45,8 @@ fn holds_number(value: &serde_json::Value, wanted: u64) -> bool {
 #[test]
 fn labels_of_the_real_capture_are_the_components_of_brute_force() {
     let Some(capture) = recorded(MONTEREY) else { return };
-    let run = Run::new(&["--from", capture.to_str().unwrap(), "--pace", "fast"]).with_all_rows().finish().expect_code(0);
+    let run =
+        Run::new(&["--from", capture.to_str().unwrap(), "--pace", "fast"]).with_all_rows().finish().expect_code(0);
     let labels = read_labels(&run.labels);
     let sweeps = read_sweeps(&capture);
     assert_eq!(labels.len(), sweeps.len());

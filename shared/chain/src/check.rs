@@ -345,9 +345,7 @@ mod tests {
         assert!(refused("budget_ms = 60.0", "budget_ms = 96.0").contains("the budgets add up to"));
         assert!(refused("budget_ms = 60.0", "budget_ms = 0.0").contains("stage.budget_ms is 0"));
         assert!(refused("budget_ms = 60.0", "").contains(r#"stage "extractor" has no budget_ms"#));
-        assert!(
-            refused(r#"reads = "Tracks""#, "reads = \"Tracks\"\nbudget_ms = 1.0").contains("has a budget_ms")
-        );
+        assert!(refused(r#"reads = "Tracks""#, "reads = \"Tracks\"\nbudget_ms = 1.0").contains("has a budget_ms"));
         assert!(refused("allowed_age_ms = 1000.0", "allowed_age_ms = 99.0").contains("at most allowed_age_ms = 99"));
     }
 

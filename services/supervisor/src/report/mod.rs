@@ -293,7 +293,9 @@ impl Report {
         }
         let LostSweeps { detections, tracks, labels } = self.lost_sweeps;
         if detections + tracks + labels > 0 {
-            return Some(format!("a file failed: detections lack {detections} sweeps, tracks {tracks}, labels {labels}"));
+            return Some(format!(
+                "a file failed: detections lack {detections} sweeps, tracks {tracks}, labels {labels}"
+            ));
         }
         if let Some(TraceReport { lost, failed: true, .. }) = self.trace {
             return Some(format!("a file failed: the trace lacks {lost} parts"));
