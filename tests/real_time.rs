@@ -123,7 +123,8 @@ fn misses_beside_hogs_are_charged_to_those_who_took_the_cores_and_end_with_them(
         ("deadline_ms = 100.0", "deadline_ms = 6.0"),
         ("budget_ms = 10.0", "budget_ms = 2.0"),
         ("budget_ms = 60.0", "budget_ms = 2.0"),
-        ("budget_ms = 20.0", "budget_ms = 2.0"),
+        ("budget_ms = 20.0", "budget_ms = 1.0"),
+        ("budget_ms = 5.0", "budget_ms = 1.0"),
         (LADDER, NO_LADDER),
     ]);
     let run = Run::new(&["--duration", "forever", "--chain", &chain]);
