@@ -58,7 +58,7 @@ fn every_stage_is_a_process_of_its_own() {
     let status = run.status().unwrap();
     let stages = status["stages"].as_array().unwrap();
     let pids: BTreeSet<u64> = stages.iter().map(|stage| stage["pid"].as_u64().unwrap()).collect();
-    assert_eq!(pids.len(), 5);
+    assert_eq!(pids.len(), 6);
     for stage in stages {
         let maps = std::fs::read_to_string(format!("/proc/{}/maps", stage["pid"])).unwrap();
         assert!(maps.contains(&format!("encke_{}_", run.instance)), "{stage} maps shared memory");
