@@ -37,7 +37,7 @@ fn bench(c: &mut Criterion) {
                 |()| {
                     trace.part.sweep = parts.get();
                     parts.set(parts.get() + 1);
-                    Sink::accept(&mut **recorder.borrow_mut(), &trace, &message)
+                    Sink::accept(&mut ***recorder.borrow_mut(), &trace, &message)
                 },
                 BatchSize::PerIteration,
             );

@@ -1,5 +1,7 @@
 //! Statistics do not grow with the run. One test in a file of its own: the allocator counts for the whole process.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod common;
 
 use std::alloc::System;

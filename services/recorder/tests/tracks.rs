@@ -1,5 +1,7 @@
 //! The file of tracks beside that of detections.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod common;
 
 use std::fs;

@@ -26,7 +26,8 @@ fn sequence(seed: u64) -> Vec<Frame> {
     let mut ids: Vec<u64> = (100..).take(count).collect();
     let mut next_id = 100 + count as u64;
     let one_sweep = |_| {
-        let (mut actual, mut claimed): (Vec<(u16, f64)>, Vec<(u64, f64)>) = Default::default();
+        let mut actual: Vec<(u16, f64)> = Vec::new();
+        let mut claimed: Vec<(u64, f64)> = Vec::new();
         for (id, at_m) in (0..).zip(&mut at_m) {
             *at_m += random.next() - 0.5;
             if random.next() > 0.15 {
