@@ -198,11 +198,11 @@ fn a_storm_of_events_says_as_many_as_it_should_and_hinders_nobody() {
 
 #[test]
 fn nothing_older_than_allowed_is_answered_though_its_stage_had_looked_at_its_age_before() {
-    // The classifier sleeps after it has looked and computed: what it then sends is old, and the sink says so.
+    // The tracker computes on after it has looked and answered: what it then sends is old, and the sink says so.
     // One obstacle, so that what comes to it is young, however busy the machine is.
     let younger = ("allowed_age_ms = 1000.0", "allowed_age_ms = 400.0");
     let chain = Endless::start_on("config/scenes/single.toml", &[younger]);
-    chain.run.inject(&["slow", "classifier", "--by", "800ms", "--for", "3s"]);
+    chain.run.inject(&["slow", "tracker", "--by", "800ms", "--for", "3s"]);
     chain.run.wait_for_more(5);
     let run = chain.stop();
     let stale = run.hop("recorder")["rejected"]["stale"].as_u64().unwrap_or(0);
