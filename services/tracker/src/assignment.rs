@@ -14,7 +14,7 @@ pub(crate) struct Edge {
 /// each column to one row, least sum of costs, where a row that stays alone costs `alone`.
 ///
 /// All memory is taken at once; a path explores only what it can reach, so that obstacles far apart cost nothing.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Assignment {
     rows: Vec<u32>,
     columns: Vec<u32>,

@@ -16,7 +16,7 @@ const LEAST_M: f64 = 0.02;
 /// Which cluster is which track: gates, global nearest neighbour, then pieces of obstacles, then obstacles in one cluster.
 ///
 /// What is compared is where returns are, not where a solid was fitted: that cannot be grossly wrong.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Association {
     edges: Vec<[Edge; MAX_EDGES]>,
     counts: Vec<usize>,

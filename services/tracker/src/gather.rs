@@ -10,7 +10,7 @@ const FARTHEST_M: f32 = 1e6;
 const WIDEST: f32 = 1e12;
 
 /// The detections of one sweep, part by part.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Gathered {
     detections: Vec<Detection>,
     solids: Vec<Solid>,

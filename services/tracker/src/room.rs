@@ -7,7 +7,7 @@ use crate::snapshots::Snapshots;
 use crate::tracking::{Scratch, Tracks};
 
 /// The stage: detections in, tracks out.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Tracker {
     params: Params,
     tracks: Tracks,

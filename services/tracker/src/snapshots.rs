@@ -5,7 +5,7 @@ use crate::tracking::Tracks;
 pub(crate) const SNAPSHOTS: usize = 16;
 
 /// The tracks as they were before each of the latest sweeps.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Snapshots {
     /// From the oldest to the latest; those beyond `count` are spare memory.
     ring: Vec<Snapshot>,

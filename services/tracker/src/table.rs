@@ -10,7 +10,7 @@ use crate::tracking::Sweep;
 pub(crate) type Seen = Vec<(u32, u32)>;
 
 /// Where tracks are put in order before they are written; all memory is taken at once.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Order(Vec<(Track, u32)>);
 
 impl Order {

@@ -86,7 +86,7 @@ pub(crate) struct Sweep<'a> {
 }
 
 /// What is needed to process a sweep, and means nothing between two.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Scratch {
     sightings: Vec<Sighting>,
     association: Association,

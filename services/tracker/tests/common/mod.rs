@@ -6,7 +6,7 @@ use lidar::ObstacleClass;
 use messages::{
     ClusterSummary, Detection, Detections, EgoMotion, Message, Part, Solid, Track, TrackState, Tracks, Verdict,
 };
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use stage::Stage;
 use tracker::{Params, Tracker};
 use zerocopy::FromZeros;
@@ -190,10 +190,4 @@ pub(crate) fn seen_from(place: [f64; 3], sweep: u64, velocity_mps: [f64; 3], spi
         seen = Seen::at(place.x, place.y, place.z);
     }
     seen
-}
-
-/// An attitude as a message has it.
-pub(crate) fn turn(attitude_wxyz: [f32; 4]) -> UnitQuaternion<f64> {
-    let [w, x, y, z] = attitude_wxyz.map(f64::from);
-    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
