@@ -1,33 +1,25 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 /// Length of the state.
-pub(crate) const STATES: usize = 15;
+pub(crate) const STATES: usize = 9;
 
 const POSITION: usize = 0;
 const VELOCITY: usize = 3;
 const SIZE: usize = 6;
-/// Lasting error of what is measured, in units of its own standard deviation.
-const ERROR: usize = 9;
 
 type State = SVector<f64, STATES>;
 type Covariance = SMatrix<f64, STATES, STATES>;
 type Gain = SMatrix<f64, STATES, 6>;
 
 /// What is measured of an obstacle, and how wrong that may be.
-///
-/// The error has two parts: one that lasts from sweep to sweep, since the view hardly changes, and one that is new each
-/// time. Their covariances add up to that of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured {
     /// Centre [m]; then extents along the body's axes [m].
     pub(crate) value: Vector6<f64>,
     /// Whether the extents were measured; else they are taken to be as expected.
     pub(crate) sized: bool,
-    /// A root of the covariance of the lasting part of the error: that part is the root times six numbers of variance 1,
-    /// and these are what lasts. So a fit that is surer than the one before it has less of the same error.
-    pub(crate) slow_root: Matrix6<f64>,
-    /// Covariance of the rest; positive definite.
-    pub(crate) white: Matrix6<f64>,
+    /// Covariance of the whole; positive definite.
+    pub(crate) covariance: Matrix6<f64>,
 }
 
 /// How obstacles move.
@@ -37,14 +29,11 @@ pub(crate) struct Motion {
     pub(crate) velocity_walk_mps: f64,
     /// The same of an extent [m].
     pub(crate) size_walk_m: f64,
-    /// Time after which the lasting error has fallen to 1/e [s].
-    pub(crate) error_s: f64,
 }
 
-/// Kalman filter of one obstacle: constant velocity, constant size, and the lasting error of its measurements as a
-/// Gauss-Markov process (Bar-Shalom, Li and Kirubarajan 2001, Secs. 6.2 and 8.2).
+/// Kalman filter of one obstacle: constant velocity and constant size (Bar-Shalom, Li and Kirubarajan 2001, Sec. 6.2).
 ///
-/// State: position, velocity and size, 3 each; lasting error, 6.
+/// State: position, velocity and size, 3 each.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     mean: State,
@@ -62,7 +51,6 @@ impl Filter {
         covariance.fixed_view_mut::<3, 3>(POSITION, POSITION).fill_diagonal(sigma_m * sigma_m);
         covariance.fixed_view_mut::<3, 3>(VELOCITY, VELOCITY).copy_from(&velocity);
         covariance.fixed_view_mut::<3, 3>(SIZE, SIZE).fill_diagonal(size_sigma_m * size_sigma_m);
-        covariance.fixed_view_mut::<6, 6>(ERROR, ERROR).fill_diagonal(1.0);
         filter
     }
 
@@ -120,58 +108,20 @@ impl Filter {
             p[(to, to)] += walk * dt_s;
             p[(SIZE + axis, SIZE + axis)] += grown;
         }
-        self.fade((-dt_s / motion.error_s).exp());
-    }
-
-    /// The fit has jumped: its lasting error may be another one, larger by so many standard deviations.
-    pub(crate) fn doubt_error(&mut self, variance: f64) {
-        for place in ERROR..STATES {
-            self.covariance[(place, place)] += variance;
-        }
-    }
-
-    /// Fits say again and again that all of this is wrong: they are believed from now on.
-    pub(crate) fn reopen(&mut self, sigma_m: f64, sigma_mps: f64, size_sigma_m: f64) {
-        for (block, sigma) in [(POSITION, sigma_m), (VELOCITY, sigma_mps), (SIZE, size_sigma_m)] {
-            for axis in 0..3 {
-                self.covariance[(block + axis, block + axis)] += sigma * sigma;
-            }
-        }
-        self.fade(0.0);
-    }
-
-    /// Leaves `kept` of the lasting error, and renews the rest.
-    fn fade(&mut self, kept: f64) {
-        for place in ERROR..STATES {
-            self.mean[place] *= kept;
-        }
-        for column in 0..STATES {
-            for row in 0..STATES {
-                if row >= ERROR {
-                    self.covariance[(row, column)] *= kept;
-                }
-                if column >= ERROR {
-                    self.covariance[(row, column)] *= kept;
-                }
-            }
-        }
-        for place in ERROR..STATES {
-            self.covariance[(place, place)] += 1.0 - kept * kept;
-        }
     }
 
     /// Takes a measurement in, by Joseph's form. Gives its squared Mahalanobis distance from what was expected: χ² with 6
     /// degrees of freedom where the model holds. Nothing changes, and nothing comes back, where the covariances' sum has
     /// no root.
     pub(crate) fn update(&mut self, measured: &Measured) -> Option<f64> {
-        let cross = observed(&self.covariance, &measured.slow_root);
+        let cross = observed(&self.covariance);
         let innovation = self.innovation(measured);
-        let root = (seen(&cross, &measured.slow_root) + measured.white).cholesky()?;
+        let root = (seen(&cross) + measured.covariance).cholesky()?;
         let gain: Gain = root.solve(&cross.transpose()).transpose();
         let mean = self.mean + gain * innovation;
         // (I − K H) P (I − K H)ᵀ + K R Kᵀ, where P Hᵀ is `cross`.
         let left = self.covariance - gain * cross.transpose();
-        let both = left - (observed(&left, &measured.slow_root) - gain * measured.white) * gain.transpose();
+        let both = left - (observed(&left) - gain * measured.covariance) * gain.transpose();
         if !(mean.iter().all(|value| value.is_finite()) && both.iter().all(|value| value.is_finite())) {
             return None;
         }
@@ -183,14 +133,12 @@ impl Filter {
     /// Squared Mahalanobis distance of a measurement from what is expected; infinite where that has no meaning.
     pub(crate) fn distance(&self, measured: &Measured) -> f64 {
         let innovation = self.innovation(measured);
-        let cross = observed(&self.covariance, &measured.slow_root);
-        let root = (seen(&cross, &measured.slow_root) + measured.white).cholesky();
+        let root = (seen(&observed(&self.covariance)) + measured.covariance).cholesky();
         root.map_or(f64::INFINITY, |root| innovation.dot(&root.solve(&innovation)))
     }
 
     fn innovation(&self, measured: &Measured) -> Vector6<f64> {
-        let error: Vector6<f64> = self.mean.fixed_rows::<6>(ERROR).into();
-        let mut innovation = measured.value - measured.slow_root * error;
+        let mut innovation = measured.value;
         for axis in 0..3 {
             innovation[axis] -= self.mean[POSITION + axis];
             innovation[3 + axis] -= self.mean[SIZE + axis];
@@ -207,28 +155,20 @@ impl Filter {
     }
 }
 
-/// M Hᵀ: the columns of what is measured. Centre and size are each seen with their lasting error.
-fn observed(matrix: &Covariance, slow_root: &Matrix6<f64>) -> Gain {
-    let mut columns: Gain = matrix.fixed_view::<STATES, 6>(0, ERROR) * slow_root.transpose();
-    for axis in 0..3 {
-        let mut centre = columns.column_mut(axis);
-        centre += matrix.column(POSITION + axis);
-        let mut size = columns.column_mut(3 + axis);
-        size += matrix.column(SIZE + axis);
-    }
+/// M Hᵀ: the columns of what is measured.
+fn observed(matrix: &Covariance) -> Gain {
+    let mut columns = Gain::zeros();
+    columns.fixed_columns_mut::<3>(0).copy_from(&matrix.fixed_columns::<3>(POSITION));
+    columns.fixed_columns_mut::<3>(3).copy_from(&matrix.fixed_columns::<3>(SIZE));
     columns
 }
 
-/// H M Hᵀ, of the M Hᵀ of a symmetric M.
-fn seen(cross: &Gain, slow_root: &Matrix6<f64>) -> Matrix6<f64> {
-    let mut seen: Matrix6<f64> = slow_root * cross.fixed_view::<6, 6>(ERROR, 0);
-    for axis in 0..3 {
-        let mut centre = seen.row_mut(axis);
-        centre += cross.row(POSITION + axis);
-        let mut size = seen.row_mut(3 + axis);
-        size += cross.row(SIZE + axis);
-    }
-    seen
+/// H M Hᵀ, of M Hᵀ.
+fn seen(cross: &Gain) -> Matrix6<f64> {
+    let mut rows = Matrix6::zeros();
+    rows.fixed_rows_mut::<3>(0).copy_from(&cross.fixed_rows::<3>(POSITION));
+    rows.fixed_rows_mut::<3>(3).copy_from(&cross.fixed_rows::<3>(SIZE));
+    rows
 }
 
 #[cfg(test)]
@@ -241,7 +181,7 @@ mod tests {
 
     use super::*;
 
-    const MOTION: Motion = Motion { velocity_walk_mps: 0.05, size_walk_m: 0.01, error_s: 1.0 };
+    const MOTION: Motion = Motion { velocity_walk_mps: 0.05, size_walk_m: 0.01 };
 
     fn normal<const N: usize>(random: &mut ChaCha8Rng, covariance: &SMatrix<f64, N, N>) -> SVector<f64, N>
     where
@@ -266,12 +206,9 @@ mod tests {
 
     /// One obstacle that obeys the model: the filter after `sweeps`, its error of position and velocity, the sum of NIS.
     fn simulated(random: &mut ChaCha8Rng, sweeps: usize) -> (Filter, Vector6<f64>, f64) {
-        let (slow, white) = (typical() * 0.6, typical() * 0.4);
         let mut position = Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random)) * 20.0;
         let mut velocity = Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random));
         let mut size = Vector3::from_element(1.0) + Vector3::<f64>::from_fn(|_, _| StandardNormal.sample(random));
-        let root = slow.cholesky().unwrap().l();
-        let mut error = normal(random, &Matrix6::identity());
         let mut filter = diffuse();
         let mut nis = 0.0;
         for sweep in 0..sweeps {
@@ -287,16 +224,13 @@ mod tests {
                     let step: f64 = StandardNormal.sample(random);
                     size[axis] += step * MOTION.size_walk_m * dt_s.sqrt();
                 }
-                let kept = (-dt_s / MOTION.error_s).exp();
-                error = error * kept + normal(random, &Matrix6::from_diagonal_element(1.0 - kept * kept));
                 filter.predict(dt_s, &MOTION);
             }
             // The view changes, and with it how wrong a fit may be.
-            let scale = 1.0 + 0.5 * (sweep % 4) as f64;
-            let (slow_root, white) = (root * scale, white * (scale * scale));
-            let noise = slow_root * error + normal(random, &white);
+            let covariance = typical() * (1.0 + 0.5 * (sweep % 4) as f64);
+            let noise = normal(random, &covariance);
             let value = Vector6::from_fn(|row, _| noise[row] + if row < 3 { position[row] } else { size[row - 3] });
-            nis += filter.update(&Measured { value, sized: true, slow_root, white }).unwrap();
+            nis += filter.update(&Measured { value, sized: true, covariance }).unwrap();
         }
         let mut wrong = Vector6::zeros();
         wrong.fixed_rows_mut::<3>(0).copy_from(&(filter.position_m() - position));
@@ -329,8 +263,6 @@ mod tests {
     fn a_constant_velocity_is_recovered() {
         let velocity = Vector3::new(0.7, -0.4, 0.1);
         let mut filter = diffuse();
-        let (slow, white) = (typical() * 0.6, typical() * 0.4);
-        let slow_root = slow.cholesky().unwrap().l();
         let still = Motion { velocity_walk_mps: 0.0, ..MOTION };
         for sweep in 0..50 {
             if sweep > 0 {
@@ -338,7 +270,7 @@ mod tests {
             }
             let centre = velocity * (0.1 * f64::from(sweep));
             let value = Vector6::new(centre.x, centre.y, centre.z, 2.0, 1.5, 1.0);
-            filter.update(&Measured { value, sized: true, slow_root, white }).unwrap();
+            filter.update(&Measured { value, sized: true, covariance: typical() }).unwrap();
         }
         assert!((filter.velocity_mps() - velocity).norm() < 1e-3);
         assert!((filter.position_m() - velocity * 4.9).norm() < 1e-3);
@@ -348,10 +280,10 @@ mod tests {
     #[test]
     fn a_measurement_without_extents_says_nothing_of_the_size() {
         let mut filter = diffuse();
-        let white = Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e4, 1e4, 1e4));
+        let covariance = Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e4, 1e4, 1e4));
         let before = (filter.size_m(), filter.size_covariance());
         let value = Vector6::new(1.0, 2.0, 3.0, f64::NAN, f64::NAN, f64::NAN);
-        filter.update(&Measured { value, sized: false, slow_root: Matrix6::zeros(), white }).unwrap();
+        filter.update(&Measured { value, sized: false, covariance }).unwrap();
         assert_eq!(filter.size_m(), before.0);
         assert!((filter.size_covariance() - before.1).abs().max() < 1e-3);
         assert!((filter.position_m() - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-3);
@@ -360,12 +292,7 @@ mod tests {
     #[test]
     fn a_covariance_without_a_root_changes_nothing() {
         let mut filter = diffuse();
-        let measured = Measured {
-            value: Vector6::zeros(),
-            sized: true,
-            slow_root: Matrix6::zeros(),
-            white: Matrix6::identity() * -1e9,
-        };
+        let measured = Measured { value: Vector6::zeros(), sized: true, covariance: Matrix6::identity() * -1e9 };
         assert_eq!(filter.update(&measured), None);
         assert_eq!(filter.distance(&measured), f64::INFINITY);
         assert_eq!(filter.position_m(), Vector3::zeros());
@@ -384,7 +311,7 @@ mod tests {
     // verifies TRA-004
     #[test]
     fn a_covariance_stays_positive_definite_whatever_is_measured() {
-        let step = (odd_covariance(), 0.0..1.0_f64, prop::array::uniform6(-1e3..1e3_f64), -0.1..3.0_f64, any::<bool>());
+        let step = (odd_covariance(), prop::array::uniform6(-1e3..1e3_f64), -0.1..3.0_f64);
         let config = ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() };
         let mut runner = proptest::test_runner::TestRunner::new_with_rng(
             config,
@@ -393,14 +320,10 @@ mod tests {
         let run = runner.run(&prop::collection::vec(step, 1..40), |steps| {
             let mut filter = diffuse();
             for round in 0..5 {
-                for (covariance, share, value, dt_s, forget) in &steps {
-                    let slow_root = (covariance * *share + Matrix6::identity() * 1e-9).cholesky().unwrap().l();
-                    let white = covariance * (1.0 - share) + Matrix6::identity() * 1e-6;
+                for (covariance, value, dt_s) in &steps {
                     filter.predict(*dt_s, &MOTION);
-                    if *forget {
-                        filter.doubt_error(dt_s.abs());
-                    }
-                    let measured = Measured { value: Vector6::from(*value), sized: round % 2 == 0, slow_root, white };
+                    let value = Vector6::from(*value);
+                    let measured = Measured { value, sized: round % 2 == 0, covariance: *covariance };
                     prop_assert!(filter.update(&measured).is_some());
                     prop_assert!(filter.is_positive_definite());
                 }

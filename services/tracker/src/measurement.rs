@@ -28,36 +28,25 @@ pub(crate) fn axis_order(attitude: &UnitQuaternion<f64>, axes: Option<&Matrix3<f
     best.copied().unwrap_or(ORDERS[0])
 }
 
-/// A measurement and its whole covariance.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Whole {
-    value: Vector6<f64>,
-    sized: bool,
-    covariance: Matrix6<f64>,
-}
-
 /// What a fitted solid measures: its centre in the tracks' frame, and its extents in the order of the track's axes.
 ///
-/// The fit's own covariance, scaled, and a floor that falls with the number of returns. A covariance without a root counts as its
-/// diagonal.
+/// The fit's own covariance, scaled, and a floor that falls with the number of returns; all of it times `stray`, which the
+/// track has learned. A covariance without a root counts as its diagonal.
 pub(crate) fn of_solid(
     solid: &Solid,
     order: &AxisOrder,
     sighting: &Sighting,
     half_m: f64,
+    stray: f64,
     params: &FitParams,
-) -> Whole {
+) -> Measured {
     let places = PLACES.map(|place| if place < 3 { place } else { 6 + order[place - 6] });
     debug_assert!(places.iter().all(|&place| place < SOLID_PARAMETERS));
     let bounded = |value: f32| f64::from(value).clamp(-UNKNOWN_M * UNKNOWN_M, UNKNOWN_M * UNKNOWN_M);
-    let root = params.size_scale.sqrt();
-    let times = |place: usize| if place < 3 { 1.0 } else { root };
-    let own = Matrix6::from_fn(|row, column| {
-        times(row) * times(column) * bounded(solid.covariance_of(places[row], places[column]))
-    });
+    let own = Matrix6::from_fn(|row, column| bounded(solid.covariance_of(places[row], places[column])));
     let floor = (params.sigma_m.powi(2) + (params.few_sigma * half_m / sighting.points.max(1.0)).powi(2)).max(LEAST_M2);
     let floor = Matrix6::from_diagonal_element(floor);
-    let scale = params.covariance_scale * (1.0 + params.few_points / sighting.points.max(1.0));
+    let scale = params.covariance_scale * (1.0 + (params.few_points / sighting.points.max(1.0)).powi(2));
     let mut covariance = own * scale + floor;
     if covariance.cholesky().is_none() {
         let diagonal = own.diagonal().map(|variance| variance.max(0.0));
@@ -66,10 +55,10 @@ pub(crate) fn of_solid(
     // Centre turned into the tracks' frame; extents are the body's own.
     let mut turn = Matrix6::identity();
     turn.fixed_view_mut::<3, 3>(0, 0).copy_from(sighting.pose.attitude.to_rotation_matrix().matrix());
-    let covariance = turn * covariance * turn.transpose();
+    let covariance = turn * covariance * turn.transpose() * stray;
     let centre = sighting.pose.place(&Vector3::from(solid.centre_m).cast());
     let extent = |place: usize| f64::from(solid.size_m[order[place]]);
-    Whole {
+    Measured {
         value: Vector6::new(centre.x, centre.y, centre.z, extent(0), extent(1), extent(2)),
         sized: true,
         covariance: (covariance + covariance.transpose()) * 0.5,
@@ -84,59 +73,36 @@ pub(crate) fn of_centroid(
     half_sigma_m: f64,
     torn: bool,
     params: &CentroidParams,
-) -> Whole {
+) -> Measured {
     let depth = depth(sighting.points, params);
     let centre = sighting.centroid_m + sighting.line_of_sight * (depth * half_m);
     let half_m = if torn { half_m.max(sighting.half_width_m) } else { half_m };
     let along = sighting.line_of_sight * sighting.line_of_sight.transpose() * (depth * half_sigma_m).powi(2);
     let place = Matrix3::identity() * spread(sighting.points, half_m, torn, params) + along;
-    let mut covariance = Matrix6::identity();
-    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&place);
-    Whole { value: Vector6::new(centre.x, centre.y, centre.z, 0.0, 0.0, 0.0), sized: false, covariance }
+    Measured::of_place(&centre, &place)
 }
 
-impl Whole {
-    /// A solid of another class than the obstacle's: its centre is one of the right body only roughly, its extents are
-    /// none.
-    pub(crate) fn foreign(mut self, half_m: f64, params: &FitParams) -> Self {
-        let place: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(0, 0).into();
-        let wider = place + Matrix3::from_diagonal_element((params.foreign_sigma * half_m).powi(2));
-        self.covariance = Matrix6::identity();
-        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&wider);
-        self.sized = false;
+impl Measured {
+    /// A centre and its covariance, and nothing of the extents.
+    fn of_place(centre: &Vector3<f64>, place: &Matrix3<f64>) -> Self {
+        let mut covariance = Matrix6::from_diagonal_element(UNKNOWN_M * UNKNOWN_M);
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(place);
+        Self { value: Vector6::new(centre.x, centre.y, centre.z, 0.0, 0.0, 0.0), sized: false, covariance }
+    }
+
+    /// A solid of a class that the obstacle has with this probability only: one of another class is off by a share of the
+    /// half extent, and so are its extents.
+    pub(crate) fn doubted(mut self, probability: f64, half_m: f64, params: &FitParams) -> Self {
+        let variance = (params.foreign_sigma * half_m).powi(2) * (1.0 - probability);
+        for place in 0..6 {
+            self.covariance[(place, place)] += if place < 3 { variance } else { 4.0 * variance };
+        }
         self
     }
 
     /// Variance of the centre, over all axes [m²].
     pub(crate) fn place_m2(&self) -> f64 {
         self.covariance.fixed_view::<3, 3>(0, 0).trace()
-    }
-
-    /// Parts the error. What is new each time is a share of the variance, and no more than `most_m` wide along any axis:
-    /// what a view does not show, the next one does not show either.
-    pub(crate) fn parted(&self, slow_share: f64, most_m: f64) -> Measured {
-        let bound = Matrix6::from_diagonal_element(most_m * most_m);
-        // (C⁻¹ + B⁻¹)⁻¹ = C − C (C + B)⁻¹ C.
-        let within = (self.covariance + bound)
-            .cholesky()
-            .map_or(self.covariance, |sum| self.covariance - self.covariance * sum.solve(&self.covariance));
-        let within = (within + within.transpose()) * (0.5 * (1.0 - slow_share));
-        let slow = self.covariance - within;
-        let root = slow.cholesky().map_or_else(
-            || Matrix6::from_diagonal(&slow.diagonal().map(|variance| variance.max(0.0).sqrt())),
-            |root| root.l(),
-        );
-        let white = within + Matrix6::from_diagonal_element(LEAST_M2);
-        let mut measured = Measured { value: self.value, sized: self.sized, slow_root: root, white };
-        if !self.sized {
-            for place in 3..6 {
-                measured.slow_root.row_mut(place).fill(0.0);
-                measured.white.row_mut(place).fill(0.0);
-                measured.white.column_mut(place).fill(0.0);
-                measured.white[(place, place)] = UNKNOWN_M * UNKNOWN_M;
-            }
-        }
-        measured
     }
 }
 
@@ -155,8 +121,8 @@ pub(crate) fn spread(points: f64, half_m: f64, torn: bool, params: &CentroidPara
 /// Adds what an unknown time makes of a known velocity.
 pub(crate) fn blur(measured: &mut Measured, velocity: &Vector3<f64>, uncertain: &Matrix3<f64>, sigma_s: f64) {
     let moved = (velocity * velocity.transpose() + uncertain) * (sigma_s * sigma_s);
-    let mut white = measured.white.fixed_view_mut::<3, 3>(0, 0);
-    white += moved;
+    let mut place = measured.covariance.fixed_view_mut::<3, 3>(0, 0);
+    place += moved;
 }
 
 #[cfg(test)]
@@ -191,16 +157,16 @@ mod tests {
     #[test]
     fn extents_are_measured_in_the_order_of_the_tracks_axes_with_their_own_covariances() {
         let params = params().fit;
-        let measured = of_solid(&solid(), &[1, 2, 0], &sighting(9, &EgoMotion::default()), 1.0, &params);
+        let measured = of_solid(&solid(), &[1, 2, 0], &sighting(9, &EgoMotion::default()), 1.0, 1.0, &params);
         assert_eq!(measured.value, Vector6::new(11.0, 0.0, 0.0, 3.0, 2.0, 1.0));
         let floor = params.sigma_m.powi(2) + (params.few_sigma / 9.0).powi(2);
-        let scale = params.covariance_scale * (1.0 + params.few_points / 9.0);
+        let scale = params.covariance_scale * (1.0 + (params.few_points / 9.0).powi(2));
         // Extents y, z, x are parameters 7, 8, 6.
         for (place, parameter) in [(3, 7), (4, 8), (5, 6)] {
             let own = f64::from(solid().covariance_of(parameter, parameter)) * scale;
-            assert!((measured.covariance[(place, place)] - own * params.size_scale - floor).abs() < 1e-6);
+            assert!((measured.covariance[(place, place)] - own - floor).abs() < 1e-6);
         }
-        let mixed = f64::from(solid().covariance_of(0, 7)) * scale * params.size_scale.sqrt();
+        let mixed = f64::from(solid().covariance_of(0, 7)) * scale;
         assert!((measured.covariance[(0, 3)] - mixed).abs() < 1e-9);
     }
 
@@ -227,22 +193,11 @@ mod tests {
         // A quarter turn about z: the sensor's x is the frame's y.
         let ego = EgoMotion { attitude_wxyz: [half, 0.0, 0.0, half], known: 1, ..EgoMotion::default() };
         let params = params().fit;
-        let level = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params);
-        let turned = of_solid(&solid(), &[0, 1, 2], &sighting(9, &ego), 1.0, &params);
+        let level = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, 1.0, &params);
+        let turned = of_solid(&solid(), &[0, 1, 2], &sighting(9, &ego), 1.0, 1.0, &params);
         assert!((turned.value.fixed_rows::<3>(0) - Vector3::new(0.0, 11.0, 0.0)).norm() < 1e-9);
         assert!((turned.covariance[(1, 1)] - level.covariance[(0, 0)]).abs() < 1e-9);
         assert!((turned.covariance[(1, 4)] - level.covariance[(0, 4)]).abs() < 1e-9);
-    }
-
-    #[test]
-    fn both_parts_of_an_error_make_all_of_it_and_what_is_new_is_bounded() {
-        let whole = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params().fit);
-        let parted = whole.parted(0.4, 0.05);
-        let sum = parted.slow_root * parted.slow_root.transpose() + parted.white;
-        assert!((sum - whole.covariance).abs().max() < 2e-6);
-        assert!(parted.white.diagonal().max() < 0.05 * 0.05);
-        let narrow = Whole { covariance: Matrix6::from_diagonal_element(1e-4), ..whole }.parted(0.4, 10.0);
-        assert!((narrow.white[(0, 0)] - 0.6e-4).abs() < 2e-6);
     }
 
     #[test]
@@ -250,10 +205,8 @@ mod tests {
         let odd = [[0.0; 45], [-1.0; 45], [1e30; 45], std::array::from_fn(|place| if place == 1 { 5.0 } else { 0.0 })];
         for covariance in odd {
             let solid = Solid { covariance, ..solid() };
-            let whole = of_solid(&solid, &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params().fit);
-            let parted = whole.parted(0.4, 0.05);
-            assert!(parted.white.cholesky().is_some(), "{covariance:?}");
-            assert!(parted.slow_root.iter().all(|one| one.is_finite()));
+            let whole = of_solid(&solid, &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, 1.0, &params().fit);
+            assert!(whole.covariance.cholesky().is_some(), "{covariance:?}");
         }
     }
 
@@ -281,12 +234,23 @@ mod tests {
     }
 
     #[test]
-    fn a_foreign_solid_tells_no_extents_and_its_centre_roughly() {
-        let params = params();
-        let own = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 1.0, &params.fit);
-        let foreign = own.foreign(1.0, &params.fit);
-        assert!(!foreign.sized && foreign.place_m2() > own.place_m2());
-        let parted = foreign.parted(0.4, 0.05);
-        assert_eq!((parted.slow_root[(3, 3)], parted.white[(3, 3)]), (0.0, UNKNOWN_M * UNKNOWN_M));
+    fn a_solid_of_an_unlikely_class_is_off_by_a_share_of_the_half_extent() {
+        let params = FitParams { foreign_sigma: 0.5, ..params().fit };
+        let own = of_solid(&solid(), &[0, 1, 2], &sighting(9, &EgoMotion::default()), 2.0, 1.0, &params);
+        assert_eq!(own.doubted(1.0, 2.0, &params).covariance, own.covariance);
+        let wider = own.doubted(0.25, 2.0, &params).covariance - own.covariance;
+        // 1 m, as a half extent 2 m, of three quarters of all.
+        assert!((wider - Matrix6::from_diagonal(&Vector6::new(0.75, 0.75, 0.75, 3.0, 3.0, 3.0))).norm() < 1e-9);
+    }
+
+    #[test]
+    fn fits_that_stray_are_wider_as_a_whole_and_those_of_few_returns_by_far() {
+        let params = params().fit;
+        let at = |points, stray| {
+            of_solid(&solid(), &[0, 1, 2], &sighting(points, &EgoMotion::default()), 1.0, stray, &params)
+        };
+        assert!((at(9, 4.0).covariance - at(9, 1.0).covariance * 4.0).norm() < 1e-9);
+        let ratio = |points| at(points, 1.0).covariance[(5, 5)] / f64::from(solid().covariance_of(8, 8));
+        assert!(ratio(5) > 10.0 * ratio(1_000), "{} {}", ratio(5), ratio(1_000));
     }
 }

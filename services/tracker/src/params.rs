@@ -56,29 +56,26 @@ pub struct MotionParams {
 pub struct FitParams {
     /// Times the fit's own covariance.
     pub covariance_scale: f64,
-    /// Returns at which that factor is doubled: fits of few returns are surer than they are right.
+    /// Returns at which that factor is doubled; beyond, it falls with the square of their number.
     pub few_points: f64,
-    /// Times the covariance of its extents, beside.
-    pub size_scale: f64,
     /// Standard deviation that every fit has beside [m].
     pub sigma_m: f64,
     /// The same of a fit to a single return, as a share of the obstacle's mean half extent; falls with their number.
     pub few_sigma: f64,
-    /// Share of the variance that lasts from sweep to sweep, 0 to 1.
-    pub slow_share: f64,
-    /// Most standard deviation of what does not last [m]: what one view does not show, the next does not show either.
-    pub white_sigma_m: f64,
-    /// Time after which the lasting error has fallen to 1/e [s].
-    pub slow_s: f64,
+    /// How fast a track learns how far its own fits stray, as a share of what the last one strayed, 0 to 1.
+    pub stray_gain: f64,
+    /// How far fits stray where their covariances hold: squared Mahalanobis distance over its degrees of freedom.
+    pub stray_expected: f64,
     /// Degrees of freedom of Student's t, by which fits far from what is expected count less.
     pub degrees_of_freedom: f64,
-    /// Squared Mahalanobis distance beyond which a fit has jumped to another minimum, with another lasting error.
+    /// Squared Mahalanobis distance beyond which a fit has jumped to another minimum.
     pub jump: f64,
     /// Jumps in a row after which it is the track that is wrong, and the fits are believed.
     pub patience: u32,
-    /// Standard deviation of a centre that was fitted as another class than the track's, as a share of the half extent.
+    /// Standard deviation of a centre, and of half extents, that were fitted as another class than the obstacle's, as a share
+    /// of the half extent.
     pub foreign_sigma: f64,
-    /// A class is the track's as long as its posterior is at least this.
+    /// Fits of a class whose posterior is less tell nothing of attitude.
     pub foreign_posterior: f64,
 }
 
@@ -94,8 +91,6 @@ pub struct CentroidParams {
     pub few_sigma: f64,
     /// Standard deviation where the cluster is only a part of the obstacle, or more than it.
     pub torn_sigma: f64,
-    /// Share of the variance that lasts from sweep to sweep, 0 to 1.
-    pub slow_share: f64,
     /// Means of returns are used only where their variance is less than so many times that of the track.
     pub worth: f64,
 }
@@ -202,7 +197,7 @@ impl Params {
     }
 
     /// Each key with its value and the range that it must be in.
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 52] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 49] {
         let Self { birth, motion, fit, centroid, association, lifecycle, class, spin, danger } = self;
         [
             ("birth.min_points", f64::from(birth.min_points), 1.0, 1e5),
@@ -213,14 +208,12 @@ impl Params {
             ("motion.size_walk_m", motion.size_walk_m, 0.0, 10.0),
             ("fit.covariance_scale", fit.covariance_scale, 0.01, 100.0),
             ("fit.few_points", fit.few_points, 0.0, 1e5),
-            ("fit.size_scale", fit.size_scale, 0.01, 1e4),
             ("fit.sigma_m", fit.sigma_m, 1e-3, 10.0),
             ("fit.few_sigma", fit.few_sigma, 0.0, 100.0),
-            ("fit.slow_share", fit.slow_share, 0.0, 0.99),
-            ("fit.white_sigma_m", fit.white_sigma_m, 1e-3, 100.0),
+            ("fit.stray_gain", fit.stray_gain, 0.0, 1.0),
+            ("fit.stray_expected", fit.stray_expected, 0.01, 100.0),
             ("fit.patience", f64::from(fit.patience), 1.0, 1e6),
             ("centroid.worth", centroid.worth, 0.0, 1e6),
-            ("fit.slow_s", fit.slow_s, 1e-3, 1e3),
             ("fit.degrees_of_freedom", fit.degrees_of_freedom, 1.0, 1e6),
             ("fit.jump", fit.jump, 1.0, 1e6),
             ("fit.foreign_sigma", fit.foreign_sigma, 0.0, 10.0),
@@ -229,7 +222,6 @@ impl Params {
             ("centroid.sigma", centroid.sigma, 0.01, 10.0),
             ("centroid.few_sigma", centroid.few_sigma, 0.0, 10.0),
             ("centroid.torn_sigma", centroid.torn_sigma, 0.01, 10.0),
-            ("centroid.slow_share", centroid.slow_share, 0.0, 0.99),
             ("association.gate", association.gate, 1.0, 1e3),
             ("association.margin_m", association.margin_m, 0.0, 10.0),
             ("lifecycle.confirm_hits", f64::from(lifecycle.confirm_hits), 1.0, 32.0),

@@ -7,13 +7,17 @@ use crate::filter::{Filter, Measured, Motion};
 use crate::frame::seconds;
 use crate::lifecycle::Life;
 use crate::measurement::{AxisOrder, axis_order, blur, of_centroid, of_solid};
-use crate::params::Params;
+use crate::params::{FitParams, Params};
 use crate::sighting::Sighting;
 use crate::spin::{AttitudeFit, SpinFilter, SpinParams};
 use crate::tracking::Sweep;
 
 /// Standard deviation of a place before it is measured [m]: wider than any fit's.
 const ANYWHERE_M: f64 = 30.0;
+/// Least and most factor on a fit's covariance that a track may learn.
+const STRAY: [f64; 2] = [0.3, 30.0];
+/// Most that one fit teaches, in times of what is expected: farther ones have jumped.
+const MOST_SURPRISE: f64 = 5.0;
 /// Half extents that are reckoned with [m].
 const HALF_M: [f64; 2] = [0.05, 25.0];
 
@@ -30,6 +34,8 @@ pub(crate) struct Tracked {
     pub(crate) seen_ns: u64,
     /// Fits in a row that were far from what was expected.
     jumps: u32,
+    /// Factor on the covariances of its fits: how much farther they stray than they say.
+    stray: f64,
     /// The last solid that was fitted.
     pub(crate) solid: Option<Attitude>,
     /// How it turns; none before the first fit that tells.
@@ -56,19 +62,16 @@ impl Attitude {
 impl Tracked {
     /// A new track, seen for the first time.
     pub(crate) fn born(id: u64, sweep: &Sweep<'_>, sighting: &Sighting) -> Self {
-        let Sweep { params, frame, .. } = *sweep;
-        let own = params.birth.velocity_sigma_mps;
-        // At rest, or along with the sensor: whatever is between.
-        let velocity = Matrix3::identity() * (own * own) + frame.velocity_mps * frame.velocity_mps.transpose();
-        let mean = [sighting.centroid_m, Vector3::zeros(), Vector3::repeat(params.birth.size_m)];
+        let params = sweep.params;
         let mut tracked = Self {
             id,
             life: Life::born(sweep.number, &params.lifecycle),
             belief: Belief::default(),
-            filter: Filter::new(mean, ANYWHERE_M, velocity, params.birth.size_sigma_m),
+            filter: unknown(sweep, sighting),
             filter_ns: sighting.time_ns,
             seen_ns: sighting.time_ns,
             jumps: 0,
+            stray: 1.0,
             solid: None,
             spin: None,
         };
@@ -76,9 +79,12 @@ impl Tracked {
         tracked
     }
 
-    /// Takes in what was seen of it. `torn`: in several clusters, or in one with something else.
-    pub(crate) fn see(&mut self, sweep: &Sweep<'_>, sighting: &Sighting, torn: bool) {
-        self.life.seen(sweep.number, &sweep.params.lifecycle);
+    /// Takes in what was seen of it. `torn`: in several clusters, or in one with something else. `shared`: in one with a
+    /// confirmed track, which confirms no other.
+    pub(crate) fn see(&mut self, sweep: &Sweep<'_>, sighting: &Sighting, torn: bool, shared: bool) {
+        if !shared || self.life.is_confirmed() {
+            self.life.seen(sweep.number, &sweep.params.lifecycle);
+        }
         self.measure(sweep, sighting, torn, false);
     }
 
@@ -94,40 +100,36 @@ impl Tracked {
         let solid = gathered.solid(sighting.detection);
         let half_m = self.half_m();
         let solid = solid.filter(|_| !torn);
-        let foreign = solid.is_some() && self.is_foreign(detection, params);
+        let probability = self.probability(detection);
         let lies = solid.map(|solid| self.lie(solid, sighting));
-        let whole = match solid.zip(lies) {
+        let mut measured = match solid.zip(lies) {
             Some((solid, lies)) => {
-                let whole = of_solid(solid, &lies.order, sighting, half_m, &params.fit);
-                if foreign { whole.foreign(half_m, &params.fit) } else { whole }
+                let measured = of_solid(solid, &lies.order, sighting, half_m, self.stray, &params.fit);
+                measured.doubted(probability, half_m, &params.fit)
             }
             None => {
                 let half_sigma_m = (self.filter.size_covariance().trace() / 3.0).sqrt() / 2.0;
                 of_centroid(sighting, half_m, half_sigma_m, torn, &params.centroid)
             }
         };
-        let share = if solid.is_some() { params.fit.slow_share } else { params.centroid.slow_share };
-        let mut measured = whole.parted(share, params.fit.white_sigma_m);
+        let place_m2 = measured.place_m2();
         if sighting.time_sigma_s > 0.0 {
             blur(&mut measured, &self.filter.velocity_mps(), &self.filter.velocity_covariance(), sighting.time_sigma_s);
         }
         self.seen_ns = sighting.time_ns;
         let known_m2 = self.spread_m2(sighting.time_ns, params).trace();
         // Returns alone tell nothing new of a place that is known much better.
-        if first || solid.is_some() || whole.place_m2() < params.centroid.worth * known_m2 {
-            let motion = Motion {
-                velocity_walk_mps: params.motion.velocity_walk_mps,
-                size_walk_m: params.motion.size_walk_m,
-                error_s: params.fit.slow_s,
-            };
+        if first || solid.is_some() || place_m2 < params.centroid.worth * known_m2 {
+            let motion =
+                Motion { velocity_walk_mps: params.motion.velocity_walk_mps, size_walk_m: params.motion.size_walk_m };
             self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion);
             self.filter_ns = sighting.time_ns;
-            let trust = if first { 1.0 } else { self.weigh(&mut measured, params) };
+            let trust = if first { 1.0 } else { self.weigh(&mut measured, sweep, sighting) };
             // A sum without a root changes nothing: the track goes on as predicted.
             let _ = self.filter.update(&measured);
             self.belief.add(&detection.posterior, trust, &params.class);
         }
-        if let Some((solid, lies)) = solid.zip(lies).filter(|_| !foreign) {
+        if let Some((solid, lies)) = solid.zip(lies).filter(|_| probability >= params.fit.foreign_posterior) {
             self.solid = Some(lies);
             let attitude = lies.attitude;
             if detection.summary.points >= params.spin.min_points {
@@ -172,37 +174,43 @@ impl Tracked {
         Attitude { attitude, order: axis_order(&attitude, before.as_ref()) }
     }
 
-    /// Student's t: what is far from what is expected counts less, and beyond a bound it has jumped, and may have another
-    /// lasting error. Where nothing but jumps comes, it is the track that is wrong. Gives the weight, 0 to 1.
-    fn weigh(&mut self, measured: &mut Measured, params: &Params) -> f64 {
+    /// Student's t: what is far from what is expected counts less. Where nothing but jumps to other minima comes, it is the
+    /// track that stands in one, and it begins anew. Gives the weight, 0 to 1.
+    fn weigh(&mut self, measured: &mut Measured, sweep: &Sweep<'_>, sighting: &Sighting) -> f64 {
+        let params = &sweep.params.fit;
         let distance = self.filter.distance(measured);
-        let freedom = if measured.sized { 6.0 } else { 3.0 };
-        let excess = (params.fit.degrees_of_freedom + distance) / (params.fit.degrees_of_freedom + freedom);
-        if !excess.is_finite() {
+        if !distance.is_finite() {
             return 0.0;
         }
-        if distance <= params.fit.jump {
+        let freedom = if measured.sized { 6.0 } else { 3.0 };
+        self.jumps = if distance > params.jump { self.jumps + 1 } else { 0 };
+        if self.jumps >= params.patience {
             self.jumps = 0;
-        } else {
-            self.jumps += 1;
-            if self.jumps >= params.fit.patience {
-                self.jumps = 0;
-                let birth = &params.birth;
-                self.filter.reopen(birth.size_sigma_m, birth.velocity_sigma_mps, birth.size_sigma_m);
-                return 1.0;
-            }
-            self.filter.doubt_error(excess);
+            self.filter = unknown(sweep, sighting);
+            return 1.0;
         }
-        if excess > 1.0 {
-            measured.white *= excess;
+        if measured.sized {
+            self.learn_stray(distance / freedom, params);
         }
-        (1.0 / excess).min(1.0)
+        let excess = ((params.degrees_of_freedom + distance) / (params.degrees_of_freedom + freedom)).max(1.0);
+        measured.covariance *= excess;
+        1.0 / excess
     }
 
-    /// Whether a detection is of a class that this obstacle surely has not.
-    fn is_foreign(&self, detection: &Detection, params: &Params) -> bool {
-        let of = detection.class.solid_index().filter(|_| self.belief.class() != ObstacleClass::Unclassified);
-        of.is_some_and(|class| self.belief.posterior()[class] < params.fit.foreign_posterior)
+    /// Fits that stray farther from expectation than they say are believed less from now on, and others more (adaptive
+    /// measurement noise by innovations: Mehra 1970).
+    fn learn_stray(&mut self, strayed: f64, params: &FitParams) {
+        let surprise = (strayed / params.stray_expected).min(MOST_SURPRISE) - 1.0;
+        self.stray = (self.stray * (1.0 + params.stray_gain * surprise)).clamp(STRAY[0], STRAY[1]);
+    }
+
+    /// How likely this obstacle is of a detection's class.
+    fn probability(&self, detection: &Detection) -> f64 {
+        let Some(class) = detection.class.solid_index() else { return 1.0 };
+        match self.belief.class() {
+            ObstacleClass::Unclassified => f64::from(detection.posterior[class]).clamp(0.0, 1.0),
+            _ => self.belief.posterior()[class],
+        }
     }
 
     /// Where its centre is expected at a sensor time [m].
@@ -254,4 +262,14 @@ impl Tracked {
         let along = solid.attitude.inverse() * from;
         (0..3).all(|rank| along[solid.order[rank]].abs() < size[rank] / 2.0 + margin_m)
     }
+}
+
+/// What is known of an obstacle before anything is measured, at a sighting.
+fn unknown(sweep: &Sweep<'_>, sighting: &Sighting) -> Filter {
+    let Sweep { params, frame, .. } = *sweep;
+    let own = params.birth.velocity_sigma_mps;
+    // At rest, or along with the sensor: whatever is between.
+    let velocity = Matrix3::identity() * (own * own) + frame.velocity_mps * frame.velocity_mps.transpose();
+    let mean = [sighting.centroid_m, Vector3::zeros(), Vector3::repeat(params.birth.size_m)];
+    Filter::new(mean, ANYWHERE_M, velocity, params.birth.size_sigma_m)
 }

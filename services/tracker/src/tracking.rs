@@ -222,8 +222,8 @@ fn update(track: &mut Tracked, place: usize, sweep: &Sweep<'_>, sightings: &[Sig
     let Sweep { gathered, params, .. } = *sweep;
     if let Some(sighting) = association.seen_as(place, sightings) {
         let many = is_one_of_many(&gathered.detections()[sighting.detection], params);
-        let torn = many || association.pieces(place) > 1 || association.is_shared(place);
-        track.see(sweep, &sighting, torn);
+        let shared = association.is_shared(place);
+        track.see(sweep, &sighting, many || association.pieces(place) > 1 || shared, shared);
     } else if let Some(shared) = association.shared(place) {
         track.glimpse(sweep, sightings[shared].time_ns);
     } else if gathered.is_whole() {

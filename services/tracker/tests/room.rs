@@ -201,7 +201,8 @@ fn two_obstacles_that_pass_in_one_cluster_stay_two() {
 #[test]
 fn a_sweep_that_was_seen_in_part_charges_nobody() {
     let mut sut = Played::new(params());
-    for _ in 0..5 {
+    // Until its velocity is known well enough for what follows.
+    for _ in 0..20 {
         sut.sweep(&[Seen::at(10.0, 5.0, 0.0)]);
     }
     let mut partly = message(0, EgoMotion::default(), &[]);
