@@ -15,13 +15,22 @@ pub(crate) struct Life {
     missed: u32,
     first_sweep: u64,
     last_sweep: u64,
+    /// The last sweep that told where it is.
+    measured_sweep: u64,
 }
 
 impl Life {
     /// Of a track that was seen for the first time.
     pub(crate) fn born(sweep: u64, params: &LifecycleParams) -> Self {
-        let mut life =
-            Self { confirmed: false, history: 0, watched: 0, missed: 0, first_sweep: sweep, last_sweep: sweep };
+        let mut life = Self {
+            confirmed: false,
+            history: 0,
+            watched: 0,
+            missed: 0,
+            first_sweep: sweep,
+            last_sweep: sweep,
+            measured_sweep: sweep,
+        };
         life.seen(sweep, params);
         life
     }
@@ -32,6 +41,11 @@ impl Life {
         self.missed = 0;
         self.last_sweep = sweep;
         self.confirmed |= self.hits(params.confirm_sweeps) >= params.confirm_hits;
+    }
+
+    /// What was seen of it told where it is.
+    pub(crate) fn measured(&mut self, sweep: u64) {
+        self.measured_sweep = sweep;
     }
 
     /// It should have been seen, and was not.
@@ -67,7 +81,7 @@ impl Life {
 
     /// What is said of it in a sweep.
     pub(crate) fn state(&self, sweep: u64) -> TrackState {
-        match (self.confirmed, self.last_sweep == sweep) {
+        match (self.confirmed, self.measured_sweep == sweep) {
             (false, _) => TrackState::Tentative,
             (true, true) => TrackState::Confirmed,
             (true, false) => TrackState::Coasting,
@@ -95,12 +109,17 @@ mod tests {
         valid_s: 1.0,
     };
 
-    /// Plays sightings (`x`), misses (`.`) and sweeps that could not show it (` `); gives what it is after each.
+    /// Plays sightings that tell where it is (`x`) and that do not (`o`), misses (`.`) and sweeps that could not show it
+    /// (` `); gives what it is after each.
     fn play(sweeps: &str) -> String {
         let mut life = Life::born(0, &PARAMS);
         let after = |(sweep, what): (usize, char)| {
             match what {
-                'x' => life.seen(sweep as u64 + 1, &PARAMS),
+                'x' => {
+                    life.seen(sweep as u64 + 1, &PARAMS);
+                    life.measured(sweep as u64 + 1);
+                }
+                'o' => life.seen(sweep as u64 + 1, &PARAMS),
                 '.' => life.missed(),
                 _ => {}
             }
@@ -137,6 +156,11 @@ mod tests {
         assert_eq!(play("   x   x"), "ttttttt".to_owned() + "C");
         assert_eq!(play("xx          x"), "tCccccccccccC");
         assert_eq!(play("xx. . . ."), "tCcccccc-");
+    }
+
+    #[test]
+    fn what_is_seen_and_tells_nothing_of_where_it_is_coasts_and_is_not_missed() {
+        assert_eq!(play("xxoooooox"), "tCccccccC");
     }
 
     #[test]

@@ -70,8 +70,10 @@ pub struct FitParams {
     pub degrees_of_freedom: f64,
     /// Squared Mahalanobis distance beyond which a fit has jumped to another minimum.
     pub jump: f64,
-    /// Jumps in a row after which it is the track that is wrong, and the fits are believed.
+    /// Jumps in a row after which it is the track that is wrong, and the fits are believed: at least so many.
     pub patience: u32,
+    /// The same as a share of the fits that the track stands on.
+    pub patience_share: f64,
     /// Standard deviation of a centre, and of half extents, that were fitted as another class than the obstacle's, as a share
     /// of the half extent.
     pub foreign_sigma: f64,
@@ -115,7 +117,7 @@ pub struct LifecycleParams {
     pub confirm_sweeps: u32,
     /// Sweeps in a row in which a confirmed track was missed where it should have been seen: then it is given up.
     pub lost_misses: u32,
-    /// Time without a measurement, hidden or not, after which a track is given up [s].
+    /// Time unseen, hidden or not, after which a track is given up [s].
     pub unseen_s: f64,
     /// Standard deviation of a place along its worst axis at which a track that is not seen is given up [m].
     pub lost_sigma_m: f64,
@@ -197,7 +199,7 @@ impl Params {
     }
 
     /// Each key with its value and the range that it must be in.
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 49] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 50] {
         let Self { birth, motion, fit, centroid, association, lifecycle, class, spin, danger } = self;
         [
             ("birth.min_points", f64::from(birth.min_points), 1.0, 1e5),
@@ -213,6 +215,7 @@ impl Params {
             ("fit.stray_gain", fit.stray_gain, 0.0, 1.0),
             ("fit.stray_expected", fit.stray_expected, 0.01, 100.0),
             ("fit.patience", f64::from(fit.patience), 1.0, 1e6),
+            ("fit.patience_share", fit.patience_share, 0.0, 1e6),
             ("centroid.worth", centroid.worth, 0.0, 1e6),
             ("fit.degrees_of_freedom", fit.degrees_of_freedom, 1.0, 1e6),
             ("fit.jump", fit.jump, 1.0, 1e6),

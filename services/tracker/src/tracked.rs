@@ -34,6 +34,8 @@ pub(crate) struct Tracked {
     pub(crate) seen_ns: u64,
     /// Fits in a row that were far from what was expected.
     jumps: u32,
+    /// Fits that the filter's state stands on.
+    fits: u32,
     /// Factor on the covariances of its fits: how much farther they stray than they say.
     stray: f64,
     /// The last solid that was fitted.
@@ -71,6 +73,7 @@ impl Tracked {
             filter_ns: sighting.time_ns,
             seen_ns: sighting.time_ns,
             jumps: 0,
+            fits: 0,
             stray: 1.0,
             solid: None,
             spin: None,
@@ -124,6 +127,7 @@ impl Tracked {
                 Motion { velocity_walk_mps: params.motion.velocity_walk_mps, size_walk_m: params.motion.size_walk_m };
             self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion);
             self.filter_ns = sighting.time_ns;
+            self.life.measured(sweep.number);
             let trust = if first { 1.0 } else { self.weigh(&mut measured, sweep, sighting) };
             // A sum without a root changes nothing: the track goes on as predicted.
             let _ = self.filter.update(&measured);
@@ -184,8 +188,10 @@ impl Tracked {
         }
         let freedom = if measured.sized { 6.0 } else { 3.0 };
         self.jumps = if distance > params.jump { self.jumps + 1 } else { 0 };
-        if self.jumps >= params.patience {
-            self.jumps = 0;
+        let patience = f64::from(params.patience).max(params.patience_share * f64::from(self.fits));
+        self.fits = self.fits.saturating_add(1);
+        if f64::from(self.jumps) >= patience {
+            (self.jumps, self.fits) = (0, 0);
             self.filter = unknown(sweep, sighting);
             return 1.0;
         }

@@ -162,8 +162,8 @@ impl Tracks {
             let track = &self.all[place];
             let unseen = track.life.ages(sweep.number).1 > 0;
             let unmeasured = track.filter_ns < track.seen_ns || unseen;
-            let long_ago = seconds(track.filter_ns, end_ns) > params.lifecycle.unseen_s;
-            let lost = unmeasured && (long_ago || track.spread_m2(end_ns, params).trace() > lost_m2);
+            let long_ago = unseen && seconds(track.seen_ns, end_ns) > params.lifecycle.unseen_s;
+            let lost = long_ago || unmeasured && track.spread_m2(end_ns, params).trace() > lost_m2;
             let double = self.all[..kept].iter().any(|older| are_one(older, track, end_ns));
             if track.life.is_over(&params.lifecycle) || lost || double {
                 seen.retain(|pair| pair.0 != kept as u32);

@@ -19,9 +19,9 @@ pub enum TrackState {
     /// Seen too seldom to be believed: it may be clutter.
     #[default]
     Tentative = 0,
-    /// Seen often enough, and in this sweep.
+    /// Seen often enough, and measured in this sweep.
     Confirmed = 1,
-    /// Confirmed, but not seen in this sweep: propagated.
+    /// Confirmed, but what was seen in this sweep, if anything, did not tell where it is: propagated.
     Coasting = 2,
 }
 
