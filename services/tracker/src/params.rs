@@ -131,8 +131,8 @@ pub struct LifecycleParams {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassParams {
-    /// What a sweep's log-posterior counts; sweeps see nearly the same, so less than 1.
-    pub weight: f64,
+    /// What each sweep after the first counts beside that one, 0 to 1: sweeps see nearly the same.
+    pub fresh_share: f64,
     /// What is left of earlier sweeps' evidence after each sweep, 0 to 1.
     pub kept: f64,
     /// Least posterior that is believed of a single sweep.
@@ -234,7 +234,7 @@ impl Params {
             ("lifecycle.lost_sigma_m", lifecycle.lost_sigma_m, 0.01, 100.0),
             ("lifecycle.gap_s", lifecycle.gap_s, 1e-3, 1e3),
             ("lifecycle.valid_s", lifecycle.valid_s, 0.0, 1e3),
-            ("class.weight", class.weight, 0.0, 10.0),
+            ("class.fresh_share", class.fresh_share, 0.0, 1.0),
             ("class.kept", class.kept, 0.0, 1.0),
             ("class.floor", class.floor, 1e-9, 0.25),
             ("spin.min_points", f64::from(spin.min_points), 1.0, 1e5),

@@ -120,6 +120,10 @@ impl Tracked {
             blur(&mut measured, &self.filter.velocity_mps(), &self.filter.velocity_covariance(), sighting.time_sigma_s);
         }
         self.seen_ns = sighting.time_ns;
+        // A whole cluster of its own tells where it is, be it worth reckoning or not.
+        if !torn || self.solid.is_none() {
+            self.life.measured(sweep.number);
+        }
         let known_m2 = self.spread_m2(sighting.time_ns, params).trace();
         // Returns alone tell nothing new of a place that is known much better.
         if first || solid.is_some() || place_m2 < params.centroid.worth * known_m2 {
@@ -128,10 +132,12 @@ impl Tracked {
             self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion);
             self.filter_ns = sighting.time_ns;
             self.life.measured(sweep.number);
-            let trust = if first { 1.0 } else { self.weigh(&mut measured, sweep, sighting) };
+            if !first {
+                self.weigh(&mut measured, sweep, sighting);
+            }
             // A sum without a root changes nothing: the track goes on as predicted.
             let _ = self.filter.update(&measured);
-            self.belief.add(&detection.posterior, trust, &params.class);
+            self.belief.add(&detection.posterior, &params.class);
         }
         if let Some((solid, lies)) = solid.zip(lies).filter(|_| probability >= params.fit.foreign_posterior) {
             self.solid = Some(lies);
@@ -179,12 +185,12 @@ impl Tracked {
     }
 
     /// Student's t: what is far from what is expected counts less. Where nothing but jumps to other minima comes, it is the
-    /// track that stands in one, and it begins anew. Gives the weight, 0 to 1.
-    fn weigh(&mut self, measured: &mut Measured, sweep: &Sweep<'_>, sighting: &Sighting) -> f64 {
+    /// track that stands in one, and it begins anew.
+    fn weigh(&mut self, measured: &mut Measured, sweep: &Sweep<'_>, sighting: &Sighting) {
         let params = &sweep.params.fit;
         let distance = self.filter.distance(measured);
         if !distance.is_finite() {
-            return 0.0;
+            return;
         }
         let freedom = if measured.sized { 6.0 } else { 3.0 };
         self.jumps = if distance > params.jump { self.jumps + 1 } else { 0 };
@@ -193,14 +199,13 @@ impl Tracked {
         if f64::from(self.jumps) >= patience {
             (self.jumps, self.fits) = (0, 0);
             self.filter = unknown(sweep, sighting);
-            return 1.0;
+            return;
         }
         if measured.sized {
             self.learn_stray(distance / freedom, params);
         }
         let excess = ((params.degrees_of_freedom + distance) / (params.degrees_of_freedom + freedom)).max(1.0);
         measured.covariance *= excess;
-        1.0 / excess
     }
 
     /// Fits that stray farther from expectation than they say are believed less from now on, and others more (adaptive
