@@ -128,9 +128,11 @@ impl std::fmt::Display for Stale {
 impl std::error::Error for Stale {}
 
 impl Track {
-    /// Places of its clusters' keys in the message's `keys`.
+    /// Places of its clusters' keys in the message's `keys`; beyond them where the track comes from elsewhere and contradicts
+    /// itself.
     pub fn key_places(&self) -> std::ops::Range<usize> {
-        self.first_key as usize..(self.first_key + self.keys) as usize
+        let first = self.first_key as usize;
+        first..first.saturating_add(self.keys as usize)
     }
 
     /// Covariance of two of position (0 to 2) and velocity (3 to 5); 0 for one that is none.
@@ -232,6 +234,17 @@ mod tests {
     fn nobody_learns_where_a_track_is_after_it_went_stale() {
         let asked_ns = 5_500_000_001;
         assert_eq!(moving().at(5_000_000_000, asked_ns), Err(Stale { asked_ns, valid_until_ns: 5_500_000_000 }));
+    }
+
+    #[test]
+    fn keys_that_no_table_can_hold_are_none() {
+        let mut table = TrackTable::new_box_zeroed().unwrap();
+        table.keys.push(7).unwrap();
+        let keys = |first_key, keys| table.keys_of(&Track { first_key, keys, ..Track::default() }).to_vec();
+        assert_eq!(keys(0, 1), [7]);
+        for (first, count) in [(0, 2), (1, 1), (u32::MAX, 1), (1, u32::MAX), (u32::MAX, u32::MAX)] {
+            assert!(keys(first, count).is_empty(), "{count} from {first}");
+        }
     }
 
     #[test]
