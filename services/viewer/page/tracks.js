@@ -46,23 +46,31 @@ function coastingBodies(tracks, hidden) {
   return tracks.filter((track) => track.solid && track.state === "coasting" && track.kind > 0 && !hidden.has(track.kind));
 }
 
-// Trails, arrows and numbers; the most dangerous last, over all others. `projected` gives where a place falls, or null.
-function drawTracks(pen, tracks, place, colourOf, word) {
+// Trails, arrows and rings; the most dangerous last, over all others. `place` gives where a place falls, or null.
+function drawTracks(pen, tracks, place, colourOf) {
   pen.lineCap = pen.lineJoin = "round";
   for (const track of [...tracks].reverse()) {
-    const colour = colourOf(track), strength = STRENGTH[track.state];
-    pen.strokeStyle = pen.fillStyle = colour;
+    const strength = STRENGTH[track.state];
+    pen.strokeStyle = pen.fillStyle = colourOf(track);
     drawTrail(pen, [track.at, ...track.trail].map(place), strength);
     pen.globalAlpha = strength;
     drawArrow(pen, place(track.at), place(add(track.at, times(track.velocity, ARROW_S))), track.state);
     if (track.alert) drawAlert(pen, place(track.at));
-    pen.font = track.alert ? "600 12px system-ui, sans-serif" : "11px system-ui, sans-serif";
-    const sign = { tentative: "?", confirmed: "", coasting: "~" }[track.state];
-    const danger = track.alert ? ` ALERT ${track.time.toFixed(1)} s, p ${met(track.met)}` : "";
-    word(`${sign}#${track.id}${danger}`, track.at, colour, track.alert ? -30 : -20);
     pen.globalAlpha = 1;
   }
   pen.lineCap = "butt";
+}
+
+// Their numbers, the most dangerous first: an alert is always said, another number only where it covers nothing.
+function nameTracks(pen, tracks, place, colourOf, words) {
+  for (const track of tracks) {
+    const sign = { tentative: "?", confirmed: "", coasting: "~" }[track.state];
+    const danger = track.alert ? ` ALERT ${track.time.toFixed(1)} s, p ${met(track.met)}` : "";
+    pen.font = track.alert ? "600 12px system-ui, sans-serif" : "11px system-ui, sans-serif";
+    pen.globalAlpha = track.alert ? 1 : Math.max(STRENGTH[track.state], 0.6);
+    words.put(`${sign}#${track.id}${danger}`, place(track.at), colourOf(track), track.alert ? [30, -20, 44, -34, 58, 72] : [20, -10, 33, -23], track.alert);
+  }
+  pen.globalAlpha = 1;
 }
 
 function drawTrail(pen, points, strength) {

@@ -139,6 +139,7 @@ impl Live {
             if let Some(whole) = self.detections_joiner.add(&part, detections) {
                 let seen = entry(&mut self.seen, part.sweep);
                 note_detections(taken.trace(), whole, seen.sweep.is_some(), &mut seen.row);
+                self.paths.note_turn(seen.row.sweep, &whole.header);
                 let bytes = seen.found.insert(Vec::new());
                 Trace::write_raw(taken.trace(), bytes);
                 whole.write_raw(bytes);

@@ -168,8 +168,10 @@ impl Recording {
                         let kind = self.channels.get(&header.channel_id);
                         let row = kind.map(|_| found.rows.entry(header.sequence).or_default());
                         let read = match (kind, row) {
-                            (Some(Kind::Sweep), Some(row)) => read_sweep(&data, spot, &mut self.sweep, row),
-                            (Some(Kind::Detections), Some(row)) => read_found(&data, spot, &mut self.detections, row),
+                            (Some(Kind::Sweep), Some(row)) => read_sweep(&data, spot, &mut self.sweep, row)
+                                .map(|()| self.paths.note_turn(header.sequence, &self.sweep.header)),
+                            (Some(Kind::Detections), Some(row)) => read_found(&data, spot, &mut self.detections, row)
+                                .map(|()| self.paths.note_turn(header.sequence, &self.detections.header)),
                             (Some(Kind::Tracks), Some(row)) => {
                                 let read = read_tracks(&data, spot, &mut self.table, row);
                                 if read.is_ok() && row.table.is_some() {
