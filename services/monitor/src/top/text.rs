@@ -51,7 +51,12 @@ fn detections(view: &View) -> String {
             size(row)
         );
     }
-    text
+    text + &more(found.clusters(), "clusters")
+}
+
+/// What of so many the text leaves out; nothing where that is nothing.
+fn more(all: usize, what: &str) -> String {
+    if all > ROWS { format!("   and {} {what} more\n", all - ROWS) } else { String::new() }
 }
 
 /// The extents of a solid.
@@ -80,7 +85,7 @@ fn tracks(view: &View) -> String {
             if row.alert { "  ALERT" } else { "" },
         );
     }
-    text
+    text + &more(found.states.iter().map(|(_, tracks)| tracks).sum(), "tracks")
 }
 
 /// A probability to the thousandth; none as a line.

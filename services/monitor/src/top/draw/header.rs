@@ -9,26 +9,38 @@ use crate::top::text::probability;
 use crate::top::ui::Ui;
 use crate::top::view::{TrackRow, View};
 
+/// Between two things in a line.
+const GAP: &str = "   ";
+
 /// The state of the chain in three lines: what, how, how well.
 pub(in crate::top) fn header_lines(view: &View) -> [String; 3] {
     let sectors = if view.sectors == 1 { "whole sweeps".to_owned() } else { format!("{} sectors", view.sectors) };
     let up = view.uptime_s.map_or("down".to_owned(), |s| format!("up {}", clock(s)));
     let (paced, name) = (view.pace, &view.instance);
     let first = format!("{name}   {}   {paced}, {sectors}   {up}", short(&view.source));
-    let (step, alert) = (view.step, alert(view));
-    let second = format!("sweep {}   {:.1} sweeps/s   step {step}{alert}", view.sweep, view.sweeps_per_s);
-    [first, second, latency(view)]
+    [first, progress(view, usize::MAX), latency(view)]
 }
 
-/// What is likelier to be met than allowed, with the gap before it; nothing where there is none.
-fn alert(view: &View) -> String {
-    let first = view.tracks.rows.iter().find(|row| row.alert);
-    let Some(TrackRow { track, time_s: Some(time_s), collision_probability, .. }) = first else { return String::new() };
+/// How the chain goes on, and what is likelier to be met than allowed. Of a line of so many letters that would be cut
+/// short, an alert stands at the head.
+fn progress(view: &View, width: usize) -> String {
+    let line = format!("sweep {}   {:.1} sweeps/s   step {}", view.sweep, view.sweeps_per_s, view.step);
+    match alert(view) {
+        None => line,
+        Some(alert) if line.len() + GAP.len() + alert.len() > width => format!("{alert}{GAP}{line}"),
+        Some(alert) => format!("{line}{GAP}{alert}"),
+    }
+}
+
+/// What is likelier to be met than allowed, where there is such.
+fn alert(view: &View) -> Option<String> {
+    let first = view.tracks.rows.iter().find(|row| row.alert)?;
+    let TrackRow { track, time_s: Some(time_s), collision_probability, .. } = first else { return None };
     let more = match view.tracks.alerts {
         1 => String::new(),
         alerts => format!(" and {} more", alerts - 1),
     };
-    format!("   ALERT #{track} p {} in {time_s:.1} s{more}", probability(*collision_probability))
+    Some(format!("ALERT #{track} p {} in {time_s:.1} s{more}", probability(*collision_probability)))
 }
 
 /// Latency and margin of the last sweeps in a line.
@@ -51,7 +63,8 @@ fn three_digits(ms: Option<f64>) -> String {
 }
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
-    let [first, second, third] = header_lines(view);
+    let [first, _, third] = header_lines(view);
+    let second = progress(view, area.width.into());
     let mut top = vec![Span::styled("encke top  ", theme::title(true)), Span::styled(first, theme::strong())];
     if ui.paused {
         top.push(Span::styled("  PAUSED ", theme::notice()));
@@ -65,7 +78,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
     let third = if view.latency.missed > 0 { Line::styled(third, theme::alarm()) } else { Line::from(third) };
     // In the fewest lines the last of them is the one to have.
     let lines = match area.height {
-        1 if view.notice.is_some() => vec![second],
+        1 if view.notice.is_some() || view.tracks.alerts > 0 => vec![second],
         1 => vec![third],
         _ => vec![Line::from(top), second, third],
     };

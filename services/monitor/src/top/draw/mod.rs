@@ -62,6 +62,8 @@ fn all(frame: &mut Frame<'_>, body: Rect, view: &View, ui: &Ui) {
     panel(frame, top, view, ui, Panel::Stages);
     if body.width >= WIDE {
         let [left, right] = Layout::horizontal([Constraint::Percentage(55), Constraint::Percentage(45)]).areas(rest);
+        // The signs of tracks begin where words of events end.
+        let left = Rect { width: left.width.saturating_sub(1), ..left };
         let [latency, events] = Layout::vertical([Constraint::Percentage(55), Constraint::Percentage(45)]).areas(left);
         panel(frame, latency, view, ui, Panel::Latency);
         panel(frame, events, view, ui, Panel::Events);

@@ -159,7 +159,19 @@ fn a_small_terminal_shows_the_chosen_panel_and_a_tiny_one_a_line() {
     let lines = drawn(60, 12, &view(), &Ui { panel: Panel::Events, ..Ui::default() });
     expect(&lines, &[" events ", "restarted: life 29"]);
     assert!(!lines.iter().any(|line| line.contains(" stages ")));
-    assert!(drawn(40, 1, &view(), &Ui::default())[0].starts_with("latency p50 4.00"));
+    let calm = View { tracks: TracksView::default(), ..view() };
+    assert!(drawn(40, 1, &calm, &Ui::default())[0].starts_with("latency p50 4.00"));
+}
+
+#[test]
+fn an_alert_is_never_cut_off() {
+    let alert = "ALERT #2048 p 0.125 in 7.5 s";
+    for width in [40, 60, 80, 200] {
+        let lines = drawn(width, 12, &view(), &Ui::default());
+        assert_eq!(lines[1].starts_with(alert), width < 80, "{}", lines[1]);
+        assert!(lines[1].contains(alert), "{}", lines[1]);
+    }
+    assert!(drawn(40, 1, &view(), &Ui::default())[0].starts_with(alert));
 }
 
 #[test]
@@ -218,4 +230,7 @@ fn text_for_pipes_says_what_the_screen_says() {
         &lines,
         &["    2048  confirmed  cylindrical   0.97      0.42       31.25          2.25     7.50       0.125  ALERT"],
     );
+    expect(&lines, &["and 30 clusters more", "and 20 tracks more"]);
+    let bare = crate::top::text::snapshot(&View::default());
+    assert!(!bare.contains(" more"), "{bare}");
 }
