@@ -31,6 +31,7 @@ mod tests;
 mod touch;
 mod trails;
 mod unknown;
+mod unknown_page;
 
 use stage::Source;
 

@@ -8,7 +8,7 @@ use super::classes::{AFTER, LEAST_RETURNS};
 use super::errors::RETURNS;
 use super::page_plots::write_plots;
 use super::table::cell;
-use super::{TrackEvaluation, TracksNote, UnknownTracks};
+use super::{TrackEvaluation, TracksNote};
 use crate::Standing;
 use crate::bars::page::{MORE_STYLE, write_bars};
 use crate::bars::table::{ends, percent};
@@ -257,19 +257,7 @@ impl TrackEvaluation {
     }
 }
 
-impl UnknownTracks {
-    /// `tracks.html` of a recording.
-    pub fn to_html(&self, note: &TracksNote) -> String {
-        let name = escaped(note.recording.as_deref().unwrap_or_default());
-        let body = format!(
-            "<h1>Tracks of a recording</h1><p>{name}. Nothing is known of their truth.</p><pre>{}</pre>",
-            escaped(&self.to_string())
-        );
-        document("Encke: tracks of a recording", MORE_STYLE, &body)
-    }
-}
-
-fn write_row(page: &mut String, cells: &[String]) -> fmt::Result {
+pub(crate) fn write_row(page: &mut String, cells: &[String]) -> fmt::Result {
     page.push_str("<tr>");
     cells.iter().try_for_each(|cell| write!(page, "<td class=\"n\">{cell}</td>"))?;
     page.push_str("</tr>");

@@ -28,7 +28,8 @@ pub(crate) fn write_plots(evaluation: &TrackEvaluation, page: &mut String) -> fm
     ));
     page.push_str(&figure(
         &charts::reliability(&evaluation.scores.classes.reliability()),
-        "Classes after ten sweeps: share right against the greatest posterior of the track.",
+        "Classes after ten sweeps: share right against the greatest posterior of the track; lines are standard errors, areas \
+         how many. On the dashed line a posterior means what it says.",
     ));
     page.push_str(&classes(evaluation));
     page.push_str("</div>");
@@ -108,6 +109,7 @@ fn consistency(evaluation: &TrackEvaluation) -> String {
             levels: vec![("95 %", 4, 95.0)],
             legend: SeriesLabelPosition::MiddleRight,
         };
+        let plot = Lines { legend: beside(&plot), ..plot };
         figure(&charts::lines(&plot), caption)
     };
     one(
@@ -115,6 +117,20 @@ fn consistency(evaluation: &TrackEvaluation) -> String {
         "time of the scene [s]",
         "NEES of position and velocity against its two-sided 95 % bounds (6 degrees of freedom), all scenes.",
     ) + &one(&consistency.by_age, "time since the track's birth [s]", "The same by the age of the track.")
+}
+
+/// Where at the right a legend of four lines covers no curve, of percentages from 0 to 104; high up where there is no such
+/// place.
+fn beside(plot: &Lines<'_>) -> SeriesLabelPosition {
+    // The plot's area and the legend's, as `charts::lines` draws them.
+    const PER_CENT_PX: f64 = 288.0 / 104.0;
+    const LEFT_PX: i32 = 286;
+    const HEIGHT: f64 = 28.0;
+    let from = plot.x.start + 0.6 * (plot.x.end - plot.x.start);
+    let curves = || plot.series.iter().flat_map(|series| &series.2).filter(|point| point.0 > from);
+    let is_free = |top: &f64| curves().all(|point| point.1 > top + 1.0 || point.1 < top - HEIGHT);
+    let top = [92.0, 85.0, 75.0, 65.0, 55.0, 45.0, 35.0].into_iter().find(is_free).unwrap_or(92.0);
+    SeriesLabelPosition::Coordinate(LEFT_PX, ((104.0 - top) * PER_CENT_PX) as i32)
 }
 
 fn classes(evaluation: &TrackEvaluation) -> String {

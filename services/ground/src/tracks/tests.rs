@@ -166,5 +166,5 @@ fn a_recording_is_told_without_truth() {
     assert_eq!((sut.sweeps, sut.rejected), (12, 0));
     assert!(sut.confirmed > 10 && sut.covered.per_cent().unwrap() > 60.0, "{sut}");
     assert!(sut.changed.of > 50 && sut.changed.per_cent().unwrap() < 5.0, "{sut}");
-    assert!(sut.to_html(&note()).contains("<pre>") && sut.to_json(&note()).contains("\"sweeps\": 12"));
+    assert!(sut.to_html(&note()).contains("<svg") && sut.to_json(&note()).contains("\"sweeps\": 12"));
 }

@@ -3,12 +3,17 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use messages::Track;
+
 use super::clear_mot::ClearMot;
 use super::frame::{Frame, Looked, is_believed};
 use crate::paper::svg::{APART, dot, open, shape, text};
 
 /// Side of the picture \[px\].
 const SIDE_PX: f64 = 1_000.0;
+
+/// Beyond so many tracks, their numbers would cover each other.
+const MOST_NUMBERS: usize = 100;
 
 /// One place in two is drawn.
 const STRIDE: usize = 2;
@@ -59,19 +64,33 @@ impl Trails {
                 }
             }
             for track in looked.tracks.iter().filter(|track| is_believed(track)) {
-                let trail = trails.tracks.entry(track.id).or_default();
-                if place % STRIDE == 0 || trail.is_empty() || is_last {
-                    trail.push([track.position_m[0], track.position_m[1]].map(f64::from));
+                if place % STRIDE == 0 || is_last || !trails.tracks.contains_key(&track.id) {
+                    trails.note(track);
                 }
             }
         }
         trails
     }
 
+    /// Adds where a track is.
+    pub(crate) fn note(&mut self, track: &Track) {
+        let [x, y, _] = track.position_m.map(f64::from);
+        self.tracks.entry(track.id).or_default().push([x, y]);
+    }
+
+    /// Distance to each side that the picture shows \[m\]: that of the obstacles; of the tracks, where no obstacles are known.
+    fn far_m(&self) -> f64 {
+        let obstacles = || self.seen.values().chain(self.hidden.values()).flatten().flatten();
+        let far_m = match obstacles().next() {
+            Some(_) => obstacles().flatten().map(|one| one.abs()).fold(5.0, f64::max),
+            None => self.tracks.values().flatten().flatten().map(|one| one.abs()).fold(5.0, f64::max),
+        };
+        far_m.min(60.0)
+    }
+
     /// The picture as SVG.
     pub(crate) fn svg(&self) -> String {
-        let stretches = self.seen.values().chain(self.hidden.values()).flatten();
-        let far_m = stretches.clone().flatten().flatten().map(|one| one.abs()).fold(5.0, f64::max).min(60.0);
+        let far_m = self.far_m();
         let scale = 0.49 * SIDE_PX / far_m;
         let place = |at: [f64; 2]| [0.5 * SIDE_PX + scale * at[0], 0.5 * SIDE_PX - scale * at[1]];
         let line = |svg: &mut String, points: &[[f64; 2]], style: &str| {
@@ -102,7 +121,10 @@ impl Trails {
                 let [x, y] = place(last);
                 let _ = write!(svg, r#"<g fill="{colour}">"#);
                 dot(&mut svg, [x, y], 2.6);
-                text(&mut svg, [x + 5.0, y - 4.0], "start", 11, &id.to_string());
+                if self.tracks.len() <= MOST_NUMBERS {
+                    let (beside, anchor) = if x > SIDE_PX - 50.0 { (x - 5.0, "end") } else { (x + 5.0, "start") };
+                    text(&mut svg, [beside, (y - 4.0).max(11.0)], anchor, 11, &id.to_string());
+                }
                 svg.push_str("</g>");
             }
         }
@@ -145,5 +167,18 @@ mod tests {
         let svg = sut.svg();
         assert!(svg.contains(">78<") && svg.matches("<polyline").count() == 6, "{svg}");
         assert!(Trails::default().svg().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn numbers_at_the_rim_stay_in_the_picture_and_of_too_many_there_are_none() {
+        let mut sut = Trails::default();
+        for (id, at_m) in [(41, [30.0, 0.0, 0.0]), (42, [0.0, 30.0, 0.0])] {
+            sut.note(&track(id, at_m));
+        }
+        let svg = sut.svg();
+        assert!(svg.contains(r#"text-anchor="end" font-size="11">41<"#), "{svg}");
+        assert!(svg.contains(r#"y="11.0" text-anchor="start" font-size="11">42<"#), "{svg}");
+        (100..=200).for_each(|id| sut.note(&track(id, [1.0, 2.0, 0.0])));
+        assert!(!sut.svg().contains(">41<"));
     }
 }

@@ -7,6 +7,7 @@ use stage::{Next, Source};
 
 use super::chase::{Chase, Rooms};
 use super::frame::is_believed;
+use super::trails::Trails;
 use crate::bars::quantile;
 use crate::{EvaluateError, Share, View};
 
@@ -51,6 +52,8 @@ pub struct UnknownTracks {
     /// Clusters of two sweeps in a row that are each other's nearest within 0.3 m and of believed tracks: those whose
     /// number changed.
     pub changed: Share,
+    /// Ways of tracks that are believed.
+    pub(crate) trails: Trails,
 }
 
 /// A cluster that a track was seen as.
@@ -116,6 +119,7 @@ impl Tally {
             }
             life.2.get_or_insert(sweep);
             believed += 1;
+            self.sum.trails.note(track);
             let keys = table.keys_of(track);
             track_of.extend(keys.iter().map(|&key| (key, track.id)));
             let is_seen = track.state == TrackState::Confirmed;
@@ -180,7 +184,9 @@ mod tests {
     use messages::{ClusterSummary, Detection, Message, Track};
     use zerocopy::FromZeros;
 
+    use super::super::TracksNote;
     use super::*;
+    use crate::RunNote;
 
     /// Two clusters side by side, and a track on each by these numbers.
     fn sweep(detections: &mut Detections, table: &mut TrackTable, ids: [u64; 2], age_sweeps: u32) {
@@ -220,6 +226,13 @@ mod tests {
         assert_eq!(sut.length_sweeps.map(|lengths| (lengths[0], lengths[5])), Some((5.0, 40.0)));
         assert!((sut.speed_mps.unwrap()[2] - 0.5).abs() < 1e-6 && sut.large_speed_mps.is_none());
         assert_eq!((sut.believed, sut.seen), (Some(2.0), Share { count: 76, of: 76 }));
+        let run = RunNote { plan_file: String::new(), machine: String::new(), cores: 2, duration_s: 1.0 };
+        let page = sut.to_html(&TracksNote { classifier: String::new(), recording: Some("<a>.pcap".to_owned()), run });
+        assert!(
+            page.contains("<dd>&lt;a&gt;.pcap</dd>") && page.contains("<td class=\"n\">1.4 % (1 of 74)</td>"),
+            "{page}"
+        );
+        assert_eq!(page.matches("<polyline").count(), 3);
         assert_eq!(Tally::default().finish(), UnknownTracks::default());
     }
 }
