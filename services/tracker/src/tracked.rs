@@ -121,12 +121,13 @@ impl Tracked {
         }
         self.seen_ns = sighting.time_ns;
         // A whole cluster of its own tells where it is, be it worth reckoning or not.
-        if !torn || self.solid.is_none() {
+        let never_fitted = self.solid.is_none();
+        if !torn || never_fitted {
             self.life.measured(sweep.number);
         }
         let known_m2 = self.spread_m2(sighting.time_ns, params).trace();
-        // Returns alone tell nothing new of a place that is known much better.
-        if first || solid.is_some() || place_m2 < params.centroid.worth * known_m2 {
+        // Returns alone tell nothing new of a place that fits know much better.
+        if solid.is_some() || never_fitted || place_m2 < params.centroid.worth * known_m2 {
             let motion =
                 Motion { velocity_walk_mps: params.motion.velocity_walk_mps, size_walk_m: params.motion.size_walk_m };
             self.filter.predict(seconds(self.filter_ns, sighting.time_ns), &motion);
