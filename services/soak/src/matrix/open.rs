@@ -33,6 +33,9 @@ const ACTIONS: [EventId; 17] = [
 /// way there when it does so for the first time, the supervisor after a death; so each process comes to have a few more, once.
 const FIRST_TIME_FILES: u64 = 16;
 
+/// What is left of a fault that is over.
+const AFTERWARDS_NS: u64 = 1_000_000_000;
+
 /// A fault that is under way, watched until the next one.
 pub(crate) struct Open {
     pub(crate) injection: Injection,
@@ -44,7 +47,7 @@ pub(crate) struct Open {
     detected: Option<(u64, &'static str)>,
     action: Vec<String>,
     last_whole_ns: Option<u64>,
-    /// The longest time without a whole answer, and its end [ns].
+    /// The longest time without a whole answer of those that began in its time, and its end [ns].
     gap: (u64, u64),
     pub(crate) refused: Option<String>,
 }
@@ -136,7 +139,7 @@ impl Open {
         for answer in answers.iter().filter(|answer| answer.whole) {
             if let Some(last) = self.last_whole_ns.replace(answer.answered_ns) {
                 let length = answer.answered_ns.saturating_sub(last);
-                if length > self.gap.0 {
+                if length > self.gap.0 && self.is_in_time(last) {
                     self.gap = (length, answer.answered_ns);
                 }
             }
@@ -155,6 +158,12 @@ impl Open {
         if self.detected.is_none() && hit.is_some_and(|counts| self.is_known(counts)) {
             self.detected = Some((now_ns, "page"));
         }
+    }
+
+    /// Whether a silence that began then may be this fault's: while it lasted, or in the second after it. Later ones are the
+    /// machine's; they count as sweeps missed and against availability.
+    fn is_in_time(&self, began_ns: u64) -> bool {
+        is_in_time(began_ns, self.output_from_ns, self.injection.lasts_s)
     }
 
     /// Whether the supervisor has settled the account of the life that was hit, or begun another one.
@@ -207,7 +216,11 @@ impl Open {
     }
 }
 
-/// From the injection to the end of the longest gap between whole answers [ms]. 0 where none was longer than a period and a half;
+fn is_in_time(began_ns: u64, from_ns: u64, lasts_s: f64) -> bool {
+    began_ns <= from_ns.saturating_add((lasts_s * 1e9) as u64).saturating_add(AFTERWARDS_NS)
+}
+
+/// From the injection to the end of the longest of its gaps between whole answers [ms]. 0 where none was longer than a period and a half;
 /// none where the longest has not ended.
 fn output_again_ms(
     (length, end_ns): (u64, u64),
@@ -236,5 +249,13 @@ mod tests {
         assert_eq!(again((100 * MS, 1_100 * MS), 4_000, 4_050), Some(0.0));
         assert_eq!(again((600 * MS, 1_550 * MS), 4_000, 4_050), Some(550.0));
         assert_eq!(again((600 * MS, 1_550 * MS), 2_000, 4_050), None);
+    }
+
+    #[test]
+    fn a_silence_long_after_a_fault_is_not_its_own() {
+        for (lasts_s, began_ms, own) in [(0.0, 900, true), (0.0, 2_000, true), (0.0, 2_001, false), (5.0, 7_000, true)]
+        {
+            assert_eq!(is_in_time(began_ms * MS, 1_000 * MS, lasts_s), own, "{lasts_s} {began_ms}");
+        }
     }
 }
