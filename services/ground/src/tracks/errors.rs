@@ -47,6 +47,8 @@ pub struct TrackErrors {
     pub velocity_mps: [RootMeanSquare; RETURNS.len()],
     /// Position [m] of tracks that are propagated only.
     pub coasting_m: RootMeanSquare,
+    /// The same of obstacles of at least 50 returns: most are in one cluster with another.
+    pub coasting_large_m: RootMeanSquare,
     /// Position [m] of tracks seen in the sweep with at least 20 returns, by sweeps since the track's birth.
     pub position_by_age_m: Vec<RootMeanSquare>,
     /// Velocity [m/s] of the same.
@@ -63,6 +65,9 @@ impl TrackErrors {
             let off_mps = (actual.velocity_mps - Vector3::from(track.velocity_mps.map(f64::from))).norm();
             if track.state == TrackState::Coasting {
                 errors.coasting_m.push(off_m);
+                if actual.returns >= RETURNS[RETURNS.len() - 1][0] {
+                    errors.coasting_large_m.push(off_m);
+                }
                 continue;
             }
             let row = RETURNS.iter().position(|&[least, most]| (least..=most).contains(&actual.returns));
@@ -87,6 +92,7 @@ impl TrackErrors {
             self.velocity_mps[row].add(&other.velocity_mps[row]);
         }
         self.coasting_m.add(&other.coasting_m);
+        self.coasting_large_m.add(&other.coasting_large_m);
         for (all, other) in [
             (&mut self.position_by_age_m, &other.position_by_age_m),
             (&mut self.velocity_by_age_mps, &other.velocity_by_age_mps),
@@ -128,11 +134,12 @@ mod tests {
         let pair = |age, actual, track| Pair { sweep: 9, age, actual, track };
         let far = track(2, [1.0, 1.5, 0.0]);
         let mut sut = TrackErrors::of(&[pair(3, &large, &near), pair(0, &small, &near), pair(9, &large, &coasting)]);
+        sut.add(&TrackErrors::of(&[pair(9, &small, &coasting)]));
         sut.add(&TrackErrors::of(&[pair(3, &large, &far)]));
         assert_eq!(sut.position_m.map(|row| row.count), [1, 0, 0, 2]);
         assert!((sut.position_m[3].value().unwrap() - (0.5 * (0.25 + 2.25_f64)).sqrt()).abs() < 1e-6);
         assert!((sut.velocity_mps[0].value().unwrap() - 2.0).abs() < 1e-6);
-        assert_eq!((sut.coasting_m.count, sut.position_m[1].value()), (1, None));
+        assert_eq!((sut.coasting_m.count, sut.coasting_large_m.count, sut.position_m[1].value()), (2, 1, None));
         assert_eq!(sut.velocity_by_age_mps.iter().map(|one| one.count).collect::<Vec<_>>(), [0, 0, 0, 2]);
         assert!((sut.large_quantiles_m().unwrap()[0] - 0.5).abs() < 1e-6);
     }

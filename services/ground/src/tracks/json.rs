@@ -80,6 +80,7 @@ impl TrackEvaluation {
         json!({
             "by_returns": rows.collect::<Vec<_>>(),
             "coasting_m": mean_square(&errors.coasting_m),
+            "coasting_large_m": mean_square(&errors.coasting_large_m),
             "position_of_50_returns_m_p50_p90_p99": errors.large_quantiles_m().map(|three| three.map(rounded)),
             "position_by_age_m": errors.position_by_age_m.iter().map(mean_square).collect::<Vec<_>>(),
             "velocity_by_age_mps": errors.velocity_by_age_mps.iter().map(mean_square).collect::<Vec<_>>(),

@@ -169,8 +169,9 @@ impl TrackEvaluation {
                 "Position of at least 50 returns: median {median:.3}, ninth decile {ninth:.3}, 99th percentile {most:.3} m. "
             )?;
         }
-        let coasting = errors.coasting_m;
-        write!(page, "Propagated only: {} m, of {}. ", cell(coasting.value(), 3), coasting.count)?;
+        let (all, large) = (errors.coasting_m, errors.coasting_large_m);
+        write!(page, "Propagated only: {} m, of {}; ", cell(all.value(), 3), all.count)?;
+        write!(page, "with 50 returns and more {} m, of {}. ", cell(large.value(), 3), large.count)?;
         let bodies = &self.scores.bodies;
         if let Some([median, ninth]) = bodies.size_per_cent() {
             write!(page, "Extents off {median:.1} %, ninth decile {ninth:.1} %. ")?;

@@ -48,8 +48,11 @@ impl fmt::Display for TrackEvaluation {
             let [position, velocity] = [position, velocity].map(|one| (cell(one.value(), 3), one.count));
             writeln!(f, "{:>14}{:>9}{:>9}{:>9}", ends(returns), position.0, velocity.0, velocity.1)?;
         }
-        let coasting = scores.errors.coasting_m;
-        writeln!(f, "{:>14}{:>9}{:>9}{:>9}", "coasting", cell(coasting.value(), 3), "", coasting.count)?;
+        for (name, coasting) in
+            [("coasting", scores.errors.coasting_m), ("of 50 and more", scores.errors.coasting_large_m)]
+        {
+            writeln!(f, "{name:>14}{:>9}{:>9}{:>9}", cell(coasting.value(), 3), "", coasting.count)?;
+        }
         if let Some([median, ninth, most]) = scores.errors.large_quantiles_m() {
             writeln!(f, "50 and more: median {median:.3}, ninth decile {ninth:.3}, 99th percentile {most:.3} m")?;
         }
