@@ -68,8 +68,8 @@ class Overlay {
     pen.stroke();
     pen.setLineDash([]);
     pen.font = "600 12px system-ui, sans-serif";
-    const track = cluster.track ?? (cluster.id === undefined ? null : cluster);
+    const tracks = cluster.tracks ?? (cluster.id === undefined ? [] : [cluster]);
     const text = cluster.kind > 0 ? `${name} ${percent(cluster.sure)}` : name;
-    words.put(track ? `${text} · #${track.id}` : text, p, colour, [-radius - 7], true);
+    words.put([text, ...tracks.map((track) => `#${track.id}`)].join(" · "), p, colour, [-radius - 7], true);
   }
 }

@@ -63,7 +63,7 @@ function said(sweep, { point, cluster }, classes) {
     lines.push(`cluster ${cluster.number} · ${counted(cluster.points, "return")}${cluster.rings > 0 ? ` on ${counted(cluster.rings, "ring")}` : ""}`);
     lines.push(`${cluster.range.toFixed(2)} m away`);
     if (solid) lines.push(`${sizeOf(solid)} m, centre ± ${solid.sigma.toFixed(2)} m`);
-    if (cluster.track) lines.push(...trackSaid(cluster.track));
+    for (const track of cluster.tracks ?? []) lines.push(...trackSaid(track));
   } else {
     lines.push("in no cluster");
   }

@@ -49,7 +49,7 @@ class TrackList {
     const danger = judged ? [track.near.toFixed(1), track.time.toFixed(1), met(track.met)] : ["", "", ""];
     for (const text of [state, track.speed.toFixed(2), ...danger]) row.insertCell().textContent = text;
     row.className = track.alert ? "alert" : track.state;
-    row.setAttribute("aria-selected", track === this.picked || track === this.picked?.track);
+    row.setAttribute("aria-selected", track === this.picked || Boolean(this.picked?.tracks?.includes(track)));
     row.addEventListener("click", () => this.pick(track.cluster ?? track));
     return row;
   }

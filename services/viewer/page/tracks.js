@@ -23,7 +23,11 @@ function tracksOf(columns, clusters) {
       size: Math.max(...size), solid: null, cluster, trail,
     };
     if (track.size > 0) track.solid = { centre: at, turn: of("t_qw", "t_qx", "t_qy", "t_qz"), size, sigma: track.sigma };
-    if (cluster) cluster.track = track;
+    // Several may be seen as one cluster: the most dangerous stands for it.
+    if (cluster) {
+      cluster.track ??= track;
+      (cluster.tracks ??= []).push(track);
+    }
     return track;
   });
 }
