@@ -1,4 +1,4 @@
-use messages::{Clusters, Message, Part, Step, Sweep, Verdict};
+use messages::{Clusters, Message, Part, Sweep, Verdict};
 use stage::{InitError, Stage};
 
 use crate::cells::Cells;
@@ -16,7 +16,7 @@ use crate::sequence::Sequence;
 /// sector.
 ///
 /// `RejectedMalformed`: the part contradicts itself, those before, or what its sweep promises. `RejectedIncomplete`: a
-/// part before it is missing or was malformed. `RejectedShed`: a part of an odd sweep at [`Step::EverySecondSweep`]. The
+/// part before it is missing or was malformed. `RejectedShed`: a part of an odd sweep at [`messages::Step::EverySecondSweep`]. The
 /// output then has the part's header and nothing else. `PartialCells` means that the cells of some last clusters of the
 /// message did not fit. An empty part has no clusters and is `Complete`.
 ///
@@ -51,7 +51,7 @@ impl Stage for Clusterer {
     fn process(&mut self, part: Part, sector: &Sweep, output: &mut Clusters) -> Verdict {
         output.clear();
         output.header = sector.header;
-        if part.step() >= Step::EverySecondSweep && part.sweep % 2 == 1 {
+        if part.is_shed() {
             self.sequence.give_up();
             return Verdict::RejectedShed;
         }

@@ -64,7 +64,7 @@ impl Gathered {
     pub(crate) fn add(&mut self, part: Part, input: &Detections) {
         let Some(begun) = &mut self.begun else { return };
         let known = input.header.period_ns > 0;
-        begun.whole &= known && begun.next_sector == part.sector;
+        begun.whole &= known && !part.is_shed() && begun.next_sector == part.sector;
         begun.next_sector = part.sector.saturating_add(1);
         if known {
             self.header = input.header;

@@ -6,7 +6,7 @@ mod common;
 
 use common::{PERIOD_NS, Played, Seen, ego, message, moving, params, part, seen_from, start_ns};
 use lidar::ObstacleClass;
-use messages::{Detections, EgoMotion, MAX_TRACKS, Message, Part, TrackState, Tracks, Verdict};
+use messages::{Detections, EgoMotion, MAX_TRACKS, Message, Part, Step, TrackState, Tracks, Verdict};
 use stage::Stage;
 use tracker::{Params, Tracker};
 use zerocopy::{FromZeros, IntoBytes};
@@ -212,6 +212,23 @@ fn a_sweep_that_was_seen_in_part_charges_nobody() {
         sut.send(if sweep % 2 == 0 { &partly } else { &unknown });
         assert_eq!(sut.only().state, TrackState::Coasting);
         assert_eq!(sut.output.table.time_ns, start_ns(sut.sweep));
+    }
+}
+
+// verifies TRA-008
+#[test]
+fn sweeps_that_are_shed_under_overload_charge_nobody() {
+    let mut sut = Played::new(params());
+    for _ in 0..20 {
+        sut.sweep(&[Seen::at(10.0, 5.0, 0.0)]);
+    }
+    for shed in 0..=params().lifecycle.lost_misses {
+        // The clusterer sends it on with its header and no clusters; the sweeps between are dropped.
+        let part = Part { step: Step::EverySecondSweep as u32, ..part(21 + 2 * u64::from(shed), 0, 1) };
+        assert!(part.is_shed());
+        sut.output.clear();
+        sut.room.process(part, &message(part.sweep, EgoMotion::default(), &[]), &mut sut.output);
+        assert_eq!(sut.only().state, TrackState::Coasting);
     }
 }
 

@@ -31,6 +31,11 @@ impl Part {
         Step::from_number(self.step)
     }
 
+    /// Whether nothing of the sweep is looked at: every odd one at [`Step::EverySecondSweep`].
+    pub fn is_shed(&self) -> bool {
+        self.step() == Step::EverySecondSweep && self.sweep % 2 == 1
+    }
+
     /// Whether the sweep ends with this part.
     pub fn is_last(&self) -> bool {
         self.sector + 1 >= self.sectors
