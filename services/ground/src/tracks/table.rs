@@ -189,7 +189,7 @@ impl fmt::Display for UnknownTracks {
         row(f, "tracks ever confirmed, never confirmed", format!("{}, {}", self.confirmed, self.unconfirmed))?;
         row(f, "length [sweeps] p10 p25 p50 p75 p90 most", six(self.length_sweeps, 0))?;
         row(f, "believed a sweep, median", cell(self.believed, 0))?;
-        row(f, "of these seen in the sweep", percent(self.seen))?;
+        row(f, "of these measured in the sweep", percent(self.seen))?;
         row(f, "speed [m/s] p10 p25 p50 p75 p90 p99", six(self.speed_mps, 3))?;
         row(f, "speed [m/s], at least 50 points", six(self.large_speed_mps, 3))?;
         let (born, sweeps) = self.births;

@@ -58,7 +58,7 @@ impl UnknownTracks {
             ("tracks that were ever confirmed", self.confirmed.to_string()),
             ("tracks that never were", self.unconfirmed.to_string()),
             ("tracks believed in a sweep, median", cell(self.believed, 0)),
-            ("of these seen in the sweep", percent(self.seen)),
+            ("of these measured in the sweep", percent(self.seen)),
             ("clusters of at least 5 points that lie on a believed track", percent(self.covered)),
             ("number changed between clusters of two sweeps that are each other's nearest within 0.3 m", changed),
             ("births a sweep, after the first 30", rate(born)),
