@@ -139,9 +139,18 @@ fn command(injection: &Injection, instance: &str) -> Result<Child, String> {
 
 /// What a command that has ended said on stderr.
 pub(super) fn said(child: &mut Child) -> String {
+    first_line(child.stderr.take(), "it said nothing")
+}
+
+/// What a command that has ended said on stdout.
+pub(super) fn answer(child: &mut Child) -> String {
+    first_line(child.stdout.take(), "")
+}
+
+fn first_line(pipe: Option<impl Read>, else_say: &str) -> String {
     let mut text = Vec::new();
-    if let Some(pipe) = child.stderr.take() {
+    if let Some(pipe) = pipe {
         let _ = pipe.take(MOST_SAID).read_to_end(&mut text);
     }
-    String::from_utf8_lossy(&text).lines().next().unwrap_or("it said nothing").to_owned()
+    String::from_utf8_lossy(&text).lines().next().unwrap_or(else_say).to_owned()
 }

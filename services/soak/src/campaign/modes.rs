@@ -8,7 +8,7 @@ use runtime::page::PageView;
 use transport::Instance;
 
 use super::ModeChangesFile;
-use super::conduct::said;
+use super::conduct::{answer, said};
 use super::day::Step;
 use crate::SoakError;
 use crate::run::encke;
@@ -72,10 +72,18 @@ impl ModeChanges {
             return;
         };
         let took_ms = now_ns.saturating_sub(under_way.began_ns) as f64 / 1e6;
-        let refused = under_way.child.as_mut().and_then(|child| match child.try_wait() {
-            Ok(Some(status)) if !status.success() => Some(said(child)),
-            _ => None,
-        });
+        let mut refused = None;
+        if let Some(child) = &mut under_way.child
+            && let Ok(Some(status)) = child.try_wait()
+        {
+            if !status.success() {
+                refused = Some(said(child));
+            } else if leads_nowhere(&under_way.command, under_way.from, &answer(child)) {
+                self.under_way = None;
+                self.next_ns = now_ns + (self.file.pause_ms * 1e6) as u64;
+                return;
+            }
+        }
         let changed = mode != under_way.from && counts.mode_changes > under_way.changes;
         if !changed && refused.is_none() && took_ms < self.file.stuck_ms {
             return;
@@ -107,10 +115,29 @@ impl ModeChanges {
         let place = (self.rng.random::<f64>() * possible.len() as f64) as usize;
         let Some(command) = possible.get(place).map(|command| (*command).clone()) else { return };
         let child = encke(["ctl", command.as_str(), "--instance", self.instance.as_str()])
-            .stdout(Stdio::null())
+            .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .ok();
         self.under_way = Some(UnderWay { command, child, from, changes, began_ns: now_ns });
+    }
+}
+
+/// Whether a chain answers that `resume` leaves it degraded: by its own ladder of overload, which no command takes back. That is
+/// no change to be measured.
+fn leads_nowhere(command: &str, from: Mode, answer: &str) -> bool {
+    command == "resume" && from == Mode::Degraded && answer.starts_with(Mode::Degraded.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_the_ladder_holds_down_is_no_change() {
+        assert!(leads_nowhere("resume", Mode::Degraded, "degraded (clusters-only)"));
+        assert!(!leads_nowhere("resume", Mode::Degraded, "nominal"));
+        assert!(!leads_nowhere("resume", Mode::Paused, "degraded (fewer-starts); resume again leads out of that"));
+        assert!(!leads_nowhere("degrade", Mode::Degraded, "degraded"));
     }
 }
