@@ -6,6 +6,7 @@ mod support;
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 use support::{Run, encke, sum, text};
@@ -125,10 +126,52 @@ fn an_output_never_destroys_the_source_or_another_output() {
     assert_eq!(fs::read_to_string(&source).unwrap(), "x,y,z\n1,2,3\n");
     let both = path("out");
     refused_in_one_line(&["run", "--detections", &both, "--report", &both], &["--report", "--detections"]);
+    assert!(!Path::new(&both).exists(), "what was only tried is gone");
     let report = path("r.json");
     fs::write(&report, "old").unwrap();
     refused(&["run", "--report", &report, "--instance", "a/b"], &["a/b"]);
     assert_eq!(fs::read_to_string(&report).unwrap(), "old");
+}
+
+#[test]
+fn an_output_through_a_link_that_leads_nowhere_yet_makes_what_it_leads_to() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    let (tracks, report) = (path("tracks"), path("report"));
+    std::os::unix::fs::symlink("t.jsonl", &tracks).unwrap();
+    std::os::unix::fs::symlink("r.json", &report).unwrap();
+    let are_links = || [&tracks, &report].iter().all(|path| fs::symlink_metadata(path).unwrap().is_symlink());
+    refused_in_one_line(&["run", "--tracks", &tracks, "--labels", &path("t.jsonl")], &["--labels", "--tracks"]);
+    assert!(are_links() && !dir.path().join("t.jsonl").exists(), "nothing was touched");
+    let output = encke()
+        .args(["run", "--sweeps", "3", "--pace", "fast", "--tracks", &tracks, "--report", &report])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(are_links());
+    assert_eq!(fs::read_to_string(path("t.jsonl")).unwrap().lines().count(), 3);
+    assert!(fs::read_to_string(path("r.json")).unwrap().contains("\"sweeps\""));
+}
+
+#[test]
+fn a_named_pipe_is_an_output_where_somebody_reads_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let pipes = ["tracks", "events", "report"].map(|name| dir.path().join(name).display().to_string());
+    assert!(Command::new("mkfifo").args(&pipes).status().unwrap().success());
+    let [tracks, events, report] = &pipes;
+    for (flag, pipe) in [("--tracks", tracks), ("--events", events), ("--report", report)] {
+        refused(&["run", "--sweeps", "1", flag, pipe], &[flag, pipe, "nobody reads this pipe"]);
+    }
+    let readers = pipes.clone().map(|pipe| Command::new("cat").arg(pipe).stdout(Stdio::piped()).spawn().unwrap());
+    let output = encke()
+        .args(["run", "--sweeps", "3", "--pace", "fast", "--tracks", tracks, "--events", events, "--report", report])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let [tracks, events, report] = readers.map(|reader| text(&reader.wait_with_output().unwrap().stdout));
+    assert_eq!(tracks.lines().count(), 3);
+    assert!(events.contains("run_ends"), "{events}");
+    assert_eq!(serde_json::from_str::<Value>(&report).unwrap()["sweeps"], 3);
 }
 
 #[test]

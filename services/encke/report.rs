@@ -22,7 +22,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     if out == Path::new("-") {
         return crate::print(&page);
     }
-    outputs::check(&[("--out", Some(&out))], &args.file)?;
+    let _pipes = outputs::check(&[("--out", Some(&out))], &args.file)?;
     outputs::write_whole(&out, page.as_bytes())?;
     crate::print(&format!("{}\n", out.display()))
 }

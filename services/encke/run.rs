@@ -35,7 +35,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         ("--events", plan.outputs.events.as_deref()),
         ("--report", args.report.as_deref()),
     ];
-    outputs::check(&files, &plan.source.from)?;
+    let _pipes = outputs::check(&files, &plan.source.from)?;
 
     let settings =
         Settings { instance, plan, iceoryx2_config: &iceoryx2_config, spawn: !args.no_spawn, adopt: args.adopt };

@@ -32,9 +32,7 @@ pub(crate) fn soak(args: &SoakArgs) -> Result<(), Failure> {
     if length_s.is_none() && !campaign.has_length() {
         return Err(Failure::start("--duration: this campaign has no length of its own: say how long"));
     }
-    if let Some(path) = &args.matrix {
-        outputs::check(&[("--matrix", Some(path))], Path::new(""))?;
-    }
+    let _pipes = outputs::check(&[("--matrix", args.matrix.as_deref())], Path::new(""))?;
     let name = args.instance.clone().unwrap_or_else(|| format!("soak-{}", std::process::id()));
     let out = std::path::absolute(&args.out).map_err(Failure::start)?;
     make_empty(&out)?;
