@@ -103,7 +103,7 @@ impl Settings {
         if !(self.deadline_ms > 0.0 && self.deadline_ms <= 3_600_000.0) {
             return Err(RecorderError::Deadline(self.deadline_ms));
         }
-        let outputs = [&self.detections, &self.labels, &self.trace];
+        let outputs = [&self.detections, &self.tracks, &self.labels, &self.trace];
         for (place, one) in outputs.iter().enumerate() {
             for (one, other) in outputs[..place].iter().filter_map(|other| one.as_ref().zip(other.as_ref())) {
                 if one == other && !is_null(one) || is_stdout(one) && is_stdout(other) {
@@ -166,6 +166,8 @@ mod tests {
         assert!(matches!(Settings { labels: Some("a".into()), ..sut() }.check(), Err(RecorderError::SameFile(_))));
         assert!(matches!(Settings { trace: Some("b".into()), ..sut() }.check(), Err(RecorderError::SameFile(_))));
         let both = Settings { detections: Some("-".into()), labels: Some("/dev/stdout".into()), ..sut() };
+        assert!(matches!(both.check(), Err(RecorderError::SameFile(_))));
+        let both = Settings { detections: Some("-".into()), tracks: Some("-".into()), ..sut() };
         assert!(matches!(both.check(), Err(RecorderError::SameFile(_))));
         let null = || Some("/dev/null".into());
         let nowhere = Settings { detections: null(), labels: null(), trace: null(), ..sut() };
