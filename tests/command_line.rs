@@ -175,6 +175,13 @@ fn a_named_pipe_is_an_output_where_somebody_reads_it() {
 }
 
 #[test]
+fn the_help_names_what_the_chain_makes() {
+    let help = text(&encke().arg("--help").output().unwrap().stdout);
+    let words: Vec<&str> = help.split_whitespace().collect();
+    assert!(words.join(" ").contains("into classified, tracked obstacles"), "{help}");
+}
+
+#[test]
 fn wrong_words_on_the_command_line_are_refused_with_usage() {
     refused(&["run", "--paec", "fast"], &["--paec", "--pace"]);
     refused(&["run", "--duration", "30"], &["30", "500ms"]);

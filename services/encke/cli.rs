@@ -13,8 +13,8 @@ pub(crate) use operate::{CtlArgs, InjectArgs, Request};
 use runtime::Pace;
 pub(crate) use soak::SoakArgs;
 
-/// Onboard lidar perception for spacecraft in clutter: a chain of processes that turns lidar sweeps into classified
-/// obstacles at sensor rate, with every deadline watched and every sweep accounted for.
+/// Onboard lidar perception for spacecraft in clutter: a chain of processes that turns lidar sweeps into classified,
+/// tracked obstacles at sensor rate, with every deadline watched and every sweep accounted for.
 ///
 /// `encke` alone runs the chain on the default scene for 100 sweeps and prints a summary.
 #[derive(Parser)]
