@@ -4,6 +4,7 @@
 
 mod support;
 
+use serde_json::Value;
 use support::{Run, encke, text};
 
 fn stop(run: &Run) {
@@ -171,7 +172,7 @@ fn damaged_parameters_and_models_are_refused_by_name_and_put_right_again() {
     for (fault, stage, file) in
         [("config-corruption", "clusterer", "clusterer.toml"), ("model-corruption", "classifier", "solids")]
     {
-        let run = Run::new(&["--duration", "forever"]);
+        let run = Run::new(&["--duration", "forever"]).with_file("--events", "e.jsonl");
         let mut child = run.start();
         run.wait_for_sweeps(5);
         let instance = transport::Instance::named(&run.instance).unwrap();
@@ -192,9 +193,18 @@ fn damaged_parameters_and_models_are_refused_by_name_and_put_right_again() {
             stop(&run);
         }
         // In safe mode, or ended: a damaged table is no ordinary run.
-        let run = run.collect(child).expect_code(1);
+        let (run, dir) = run.collect_and_keep(child);
+        let run = run.expect_code(1);
         assert!(run.is_closed(), "{}", run.stdout());
         assert!(run.stderr().contains(file), "{fault}: {}", run.stderr());
+        // One that was refused died by its own number, not by that of the life before it.
+        let events = std::fs::read_to_string(dir.path().join("e.jsonl")).unwrap();
+        let events: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let deaths = events.iter().filter(|event| event["name"] == "stage_died" && event["stage"] == stage);
+        let texts: Vec<&str> = deaths.map(|event| event["text"].as_str().unwrap()).collect();
+        let pids: Vec<u64> = run.process(stage)["pids"].as_array().unwrap().iter().filter_map(Value::as_u64).collect();
+        let told: Vec<u64> = texts.iter().map(|text| text.split([' ', ':']).nth(1).unwrap().parse().unwrap()).collect();
+        assert!(told.len() > 1 && pids.starts_with(&told), "{texts:?} of {pids:?}");
     }
 }
 

@@ -160,7 +160,7 @@ impl Watch<'_> {
     /// Says that a stage's process ended that was not told to. Gives what its page counted as lost by then.
     pub(crate) fn tell_death(&mut self, position: usize, ended: Ended) -> u64 {
         let stage = &self.stages[position];
-        let (name, pid, lost) = (stage.name.clone(), stage.page.pid.get(), stage.page.lost.get());
+        let (name, pid, lost) = (stage.name.clone(), stage.last_pid(), stage.page.lost.get());
         if !stage.told {
             self.tell_end_of(&name, pid, ended);
         }

@@ -119,7 +119,7 @@ impl Watch<'_> {
         if ended == Ended::Code(CANNOT_START) && !self.begun {
             return Err(SupervisorError::Refused(TAPE.to_owned()));
         }
-        let pid = page.pid.get();
+        let pid = tape.process.last_pid();
         self.tell_end_of(TAPE, pid, ended);
         let Some(tape) = &mut self.tape else { return Ok(()) };
         if ended == Ended::Code(CANNOT_START) {

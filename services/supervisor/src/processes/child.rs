@@ -153,6 +153,11 @@ impl Watched {
         if self.ours || !lives { None } else { stage_process(&self.instance, &self.page) }
     }
 
+    /// The last process that it was: of one that ended, the one that did, though it may not have taken its page yet.
+    pub(crate) fn last_pid(&self) -> u64 {
+        self.pids.last().map_or_else(|| self.page.pid.get(), |pid| u64::from(*pid))
+    }
+
     /// Whether its process has ended since the last look, and how.
     pub(crate) fn look(&mut self) -> Option<Ended> {
         if self.ours {
