@@ -6,6 +6,7 @@ mod support;
 
 use std::collections::BTreeSet;
 
+use serde_json::Value;
 use support::{LADDER, NO_LADDER, Run, chain_with, encke, leftovers, sum, text};
 
 #[test]
@@ -28,6 +29,16 @@ fn every_sweep_gets_a_line_and_the_ledger_closes() {
     let returns: u64 = run.detections.iter().map(|line| line["returns"].as_u64().unwrap()).sum();
     assert_eq!(rows as u64, returns);
     assert!(returns > 60 * 1_000, "a scene with obstacles has returns: {returns}");
+    // So do its tracks and those of their file, and the summary says them.
+    let lines = run.tracks.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let confirmed: Vec<usize> = lines
+        .map(|line| line["tracks"].as_array().unwrap().iter().filter(|track| track["state"] != "tentative").count())
+        .collect();
+    let (most, last) = (*confirmed.iter().max().unwrap(), *confirmed.last().unwrap());
+    let tracks = &run.report["tracks"];
+    assert_eq!((&tracks["confirmed_max"], &tracks["confirmed_last"]), (&most.into(), &last.into()));
+    let line = format!("tracks      {most} confirmed at most, {last} at the end; {} alerts", tracks["alerts"]);
+    assert!(most > 0 && run.stdout().contains(&line), "{line}: {}", run.stdout());
 }
 
 #[test]

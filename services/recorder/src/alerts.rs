@@ -1,23 +1,31 @@
-//! Which alerts have begun: each track is told of once, until it is no longer on alert.
+//! Which alerts have begun: each track is told of once, until it is no longer on alert. And how many tracks there were.
 
-use messages::{MAX_TRACKS, TrackTable};
+use messages::{MAX_TRACKS, TrackState, TrackTable};
 use stage::Alert;
+
+use crate::snapshot::TrackCounts;
 
 /// Tracks on alert at the last table, and those that began with it. All memory is made with it.
 pub(crate) struct Alerts {
     /// Numbers of tracks on alert, in rising order.
     known: Vec<u64>,
     begun: Vec<Alert>,
+    counts: Option<TrackCounts>,
 }
 
 impl Alerts {
     pub(crate) fn new() -> Self {
-        Self { known: Vec::with_capacity(MAX_TRACKS), begun: Vec::with_capacity(MAX_TRACKS) }
+        Self { known: Vec::with_capacity(MAX_TRACKS), begun: Vec::with_capacity(MAX_TRACKS), counts: None }
     }
 
     /// Those that began with the last part.
     pub(crate) fn begun(&self) -> &[Alert] {
         &self.begun
+    }
+
+    /// What all tables held; none where none came.
+    pub(crate) fn counts(&self) -> Option<TrackCounts> {
+        self.counts
     }
 
     /// A part comes that has no table.
@@ -41,6 +49,10 @@ impl Alerts {
         self.known.clear();
         self.known.extend(on_alert().map(|track| track.id));
         self.known.sort_unstable();
+        let confirmed = table.tracks.iter().filter(|track| track.state != TrackState::Tentative).count() as u64;
+        let alerts = self.begun.len() as u64;
+        let counts = TrackCounts { confirmed_max: confirmed, confirmed_last: confirmed, alerts };
+        self.counts.get_or_insert_default().merge(&counts);
     }
 }
 

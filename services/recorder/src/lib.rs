@@ -76,6 +76,6 @@ pub use latency::{LatencySnapshot, Percentiles};
 pub use over_time::{LatencyBucket, LatencyPoints, SpentTime, SweepTimeline};
 pub use recorder::Recorder;
 pub use settings::{MAX_QUEUE_PARTS, RecorderError, Settings};
-pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, TraceCounts, VERSION};
+pub use snapshot::{Deadline, LostSweeps, Snapshot, SnapshotError, StageSnapshot, TraceCounts, TrackCounts, VERSION};
 pub use timeline::{BucketSnapshot, TimelineSnapshot};
 pub use worst::{WorstHop, WorstSweep};

@@ -91,6 +91,7 @@ impl Recorder {
         snapshot.lost_sweeps.tracks = self.progress.lost_tracks.load(Ordering::Relaxed);
         snapshot.lost_sweeps.labels = self.progress.lost_labels.load(Ordering::Relaxed);
         snapshot.trace = self.trace.as_ref().map(TraceLine::counts);
+        snapshot.tracks = self.alerts.counts();
     }
 
     fn take(&mut self, trace: &Trace, input: &Tracks) -> Verdict {

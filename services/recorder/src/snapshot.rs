@@ -17,7 +17,7 @@ use crate::worst::{WorstSweep, merge};
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// The recorder's statistics at one moment: of one life of its process, or merged, of several.
 ///
@@ -82,6 +82,29 @@ pub struct Snapshot {
     pub stages: Vec<StageSnapshot>,
     /// What became of the trace file's events; none where no such file is written.
     pub trace: Option<TraceCounts>,
+    /// What the tables of tracks held; none where none came.
+    pub tracks: Option<TrackCounts>,
+}
+
+/// Tables of tracks in numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrackCounts {
+    /// Most confirmed tracks in one table, coasting ones included.
+    pub confirmed_max: u64,
+    /// Confirmed tracks in the last table, coasting ones included.
+    pub confirmed_last: u64,
+    /// Alerts that began. One that outlasts a restart of the recorder begins anew with it.
+    pub alerts: u64,
+}
+
+impl TrackCounts {
+    /// Adds what later tables held.
+    pub(crate) fn merge(&mut self, later: &Self) {
+        self.confirmed_max = self.confirmed_max.max(later.confirmed_max);
+        self.confirmed_last = later.confirmed_last;
+        self.alerts += later.alerts;
+    }
 }
 
 /// A trace file in numbers.
@@ -271,6 +294,9 @@ impl Snapshot {
             trace.events += later.events;
             trace.lost += later.lost;
             trace.failed |= later.failed;
+        }
+        if let Some(later) = &later.tracks {
+            self.tracks.get_or_insert_default().merge(later);
         }
         Ok(())
     }

@@ -357,7 +357,7 @@ fn a_snapshot_comes_back_from_its_file() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
     assert!(Snapshot::read(&folder.path().join("none")).unwrap_err().to_string().contains("none"));
     Snapshot { version: 9, ..written }.write(&path).unwrap();
-    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 4"));
+    assert!(Snapshot::read(&path).unwrap_err().to_string().ends_with("has version 9, must be 5"));
     std::fs::write(&path, "{").unwrap();
     assert!(Snapshot::read(&path).unwrap_err().to_string().contains("is no snapshot"));
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use common::{HandMade, settings_in, start};
 use messages::{MAX_TRACKS, Trace, Track, TrackState, Tracks, Verdict};
-use recorder::Settings;
+use recorder::{Settings, Snapshot, TrackCounts};
 use serde_json::Value;
 use stage::Sink;
 use zerocopy::FromZeros;
@@ -74,6 +74,45 @@ fn each_sweep_has_a_line_of_tracks_that_names_the_clusters_of_its_detections() {
         assert_eq!(rows[0]["clusters"], serde_json::json!([1, 4]));
         assert_eq!((&rows[1]["clusters"], &rows[1]["closest_approach"]), (&serde_json::json!([2]), &Value::Null));
     }
+}
+
+// verifies REC-027
+#[test]
+fn confirmed_tracks_and_alerts_are_counted_through_all_lives() {
+    let table = |sweep: u64, states: &[TrackState], on_alert: u8| {
+        let (trace, mut message) = tracked(sweep).pop().unwrap();
+        message.table.tracks.clear();
+        for (id, &state) in (0..).zip(states) {
+            message
+                .table
+                .tracks
+                .push(Track { id, state, alert: u8::from(id == 0) & on_alert, ..Track::default() })
+                .unwrap();
+        }
+        message.table.keys.clear();
+        (trace, message)
+    };
+    let life = |tables: &[(Trace, Box<Tracks>)]| {
+        let mut recorder = start(common::settings()).unwrap();
+        for (trace, message) in tables {
+            assert_eq!(Sink::accept(&mut *recorder, trace, message), Verdict::Complete);
+        }
+        let mut found = Snapshot::default();
+        recorder.snapshot_into(&mut found);
+        found
+    };
+    use TrackState::{Coasting, Confirmed, Tentative};
+    let mut found = life(&[]);
+    assert_eq!(found.tracks, None);
+    found = life(&[
+        table(0, &[Tentative, Confirmed], 0),
+        table(1, &[Confirmed, Coasting, Confirmed, Tentative], 1),
+        table(2, &[Confirmed, Tentative], 1),
+    ]);
+    assert_eq!(found.tracks, Some(TrackCounts { confirmed_max: 3, confirmed_last: 1, alerts: 1 }));
+    found.merge(&life(&[table(3, &[Confirmed, Confirmed], 1)])).unwrap();
+    found.merge(&life(&[])).unwrap();
+    assert_eq!(found.tracks, Some(TrackCounts { confirmed_max: 3, confirmed_last: 2, alerts: 2 }));
 }
 
 // verifies REC-006

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chain::Mode;
 use lidar::ObstacleClass;
-use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, WorstSweep};
+use recorder::{LatencyPoints, LostSweeps, Percentiles, Snapshot, TrackCounts, WorstSweep};
 use runtime::{Pace, Plan};
 use serde::{Deserialize, Serialize};
 
@@ -78,6 +78,9 @@ pub struct Report {
     pub realtime_refused: Vec<String>,
     /// Detections by class.
     pub detections: BTreeMap<ObstacleClass, u64>,
+    /// Tracks and alerts in numbers, where any table of tracks came.
+    #[serde(default)]
+    pub tracks: Option<TrackCounts>,
     /// Accepted returns of all sweeps.
     pub returns: u64,
     /// Refused returns of all sweeps, by reason.
@@ -238,6 +241,7 @@ impl Report {
                 .into_iter()
                 .map(|class| (class, snapshot.detections.get(&class).copied().unwrap_or(0)))
                 .collect(),
+            tracks: snapshot.tracks,
             returns: snapshot.returns,
             refused: snapshot.refused,
             complete_sweeps: snapshot.complete_sweeps,

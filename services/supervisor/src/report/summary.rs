@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use messages::Step;
-use recorder::{Percentiles, WorstHop, WorstSweep};
+use recorder::{Percentiles, TrackCounts, WorstHop, WorstSweep};
 
 use crate::processes::beside::RecordingReport;
 use crate::report::{LEAST_MARGIN_PCT, TraceReport};
@@ -43,6 +43,9 @@ fn write_summary(text: &mut String, report: &Report) -> std::fmt::Result {
     write_machine(text, report)?;
     let classes: Vec<_> = report.detections.iter().map(|(class, count)| format!("{} {count}", class.name())).collect();
     writeln!(text, "\ndetections  {}", classes.join("  "))?;
+    if let Some(TrackCounts { confirmed_max, confirmed_last, alerts }) = report.tracks {
+        writeln!(text, "tracks      {confirmed_max} confirmed at most, {confirmed_last} at the end; {alerts} alerts")?;
+    }
     if let Some(recording) = &report.recording {
         let RecordingReport { file, counts, restarts, .. } = recording;
         let mib = counts.bytes as f64 / f64::from(1 << 20);
