@@ -6,7 +6,7 @@ mod support;
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
@@ -34,8 +34,14 @@ fn stop(run: Run, child: Child) -> Finished {
 
 /// `encke live` on a chain, and its address.
 fn live(run: &Run) -> (Child, String) {
+    serving(run, &["live", "--port", "0"])
+}
+
+/// A command that looks at a chain and serves what it sees, and its address.
+fn serving(run: &Run, command: &[&str]) -> (Child, String) {
     let mut child = encke()
-        .args(["live", "--port", "0", "--instance", &run.instance])
+        .args(command)
+        .args(["--instance", &run.instance])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -160,4 +166,100 @@ fn viewers_that_stand_still_or_die_cost_the_chain_nothing() {
     drop(frozen);
     let finished = stop(run, child);
     assert!(finished.is_closed() && finished.missing() == 0, "{}", finished.stdout());
+}
+
+/// Its exit code and what it said on stderr. One that does not end is a failure, not a long test.
+fn ended(mut child: Child) -> (Option<i32>, String) {
+    for _ in 0..1_500 {
+        if child.try_wait().unwrap().is_some() {
+            let output = child.wait_with_output().unwrap();
+            return (output.status.code(), text(&output.stderr));
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    panic!("it did not end within 30 s");
+}
+
+const SERVING: [&[&str]; 3] = [&["live", "--port", "0"], &["metrics", "--listen", "127.0.0.1:0"], &["view", "--live"]];
+
+// verifies MON-018
+#[test]
+fn a_viewer_leaves_in_order_when_asked_or_when_its_terminal_closes() {
+    let (run, child) = running("fast");
+    for command in SERVING {
+        for by in [Signal::HUP, Signal::INT, Signal::TERM] {
+            let (viewer, _) = serving(&run, command);
+            signal(&viewer, by);
+            let (code, said) = ended(viewer);
+            assert_eq!(code, Some(0), "{command:?} by {by:?}: {said}");
+        }
+    }
+    let (view, _) = serving(&run, &["view", "--live"]);
+    let (waiting, _) = serving(&run, &["live", "--port", "0", "--wait"]);
+    stop(run, child);
+    let (code, said) = ended(view);
+    assert!(code == Some(0) && said.contains("the chain has ended"), "{said}");
+    // Also while it waits for the chain's next start. It looks for the supervisor all the time.
+    std::thread::sleep(Duration::from_millis(500));
+    signal(&waiting, Signal::TERM);
+    assert_eq!(ended(waiting).0, Some(0));
+}
+
+// verifies MON-018
+#[test]
+fn top_leaves_in_order_when_its_terminal_closes() {
+    if Command::new("script").arg("--version").output().is_err() {
+        return eprintln!("skipped: no script(1) here, which has terminals");
+    }
+    let (run, child) = running("fast");
+    let (code, shown) = (run.dir.path().join("code"), run.dir.path().join("shown"));
+    // The shell outlives the terminal, and its trap does not pass to what it starts.
+    let top = format!(
+        "trap : HUP; stty rows 40 columns 140; {} top --instance {}; echo $? > {}",
+        env!("CARGO_BIN_EXE_encke"),
+        run.instance,
+        code.display()
+    );
+    let mut terminal = Command::new("script");
+    terminal.args(["-qfc", &top]).arg(&shown).env("SHELL", "/bin/sh").env("TERM", "xterm").stdin(Stdio::piped());
+    let mut terminal = terminal.stdout(Stdio::null()).spawn().unwrap();
+    let until = |what: &str, holds: &dyn Fn() -> bool| {
+        for _ in 0..1_500 {
+            if holds() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("not within 30 s: {what}");
+    };
+    until("top shows the chain", &|| std::fs::read(&shown).is_ok_and(|shown| text(&shown).contains("tracker")));
+    terminal.kill().unwrap();
+    terminal.wait().unwrap();
+    until("top has left", &|| std::fs::read_to_string(&code).is_ok_and(|code| code.ends_with('\n')));
+    assert_eq!(std::fs::read_to_string(&code).unwrap(), "0\n");
+    stop(run, child);
+}
+
+#[test]
+fn a_chain_ends_in_order_with_its_terminal_but_not_under_nohup() {
+    let ignoring = |command: Command| {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "trap '' HUP; exec \"$0\" \"$@\""]).arg(command.get_program()).args(command.get_args());
+        shell
+    };
+    let run = Run::new(&["--duration", "forever", "--pace", "fast"]);
+    let child = run.start_with(ignoring);
+    run.wait_for_sweeps(5);
+    let stage = run.status().unwrap()["stages"][1]["pid"].as_u64().unwrap();
+    signal(&child, Signal::HUP);
+    kill_process(Pid::from_raw(stage as i32).unwrap(), Signal::HUP).unwrap();
+    run.wait_for_more(10);
+    let finished = stop(run, child);
+    assert_eq!(finished.process("clusterer")["restarts"], 0);
+
+    let (run, child) = running("fast");
+    signal(&child, Signal::HUP);
+    let finished = run.collect(child).expect_code(0);
+    assert!(finished.is_closed() && finished.stdout().contains("ledger closed"), "{}", finished.stdout());
 }

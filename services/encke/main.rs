@@ -95,15 +95,12 @@ fn main() -> ExitCode {
         Command::Live(args) => live::live(&args),
         Command::View(args) => view::view(&args),
     };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Failed(cause)) => {
-            eprintln!("encke: {cause}");
-            ExitCode::from(1)
-        }
-        Err(Failure::CannotStart(cause)) => {
-            eprintln!("encke: {cause}");
-            ExitCode::from(2)
-        }
-    }
+    let (cause, code) = match outcome {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Failed(cause)) => (cause, 1),
+        Err(Failure::CannotStart(cause)) => (cause, 2),
+    };
+    // A terminal that has closed is no reason to end by a panic.
+    let _ = writeln!(std::io::stderr(), "encke: {cause}");
+    ExitCode::from(code)
 }

@@ -9,7 +9,8 @@ pub(super) const RUN_EXAMPLES: &str = "Examples:
   encke run --record run.mcap                      for Foxglove, and to be replayed: --from run.mcap
   encke run --duration 10s --trace trace.json      open the file in ui.perfetto.dev
 
-Ctrl-C and SIGTERM stop the chain in order, drain it, and print the summary.";
+Ctrl-C, SIGTERM and a terminal that closes (SIGHUP, unless under nohup) stop the chain in order, drain it, and print the
+summary.";
 
 pub(super) const SIMULATE_EXAMPLES: &str = "Examples:
   encke simulate --scene config/scenes/default.toml --sweeps 50 --out scene.pcap

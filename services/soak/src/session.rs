@@ -7,8 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use runtime::page::PageView;
-use runtime::{Plan, SOURCE, clock};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use runtime::{Plan, SOURCE, clock, stop_signals};
 use transport::Instance;
 
 use crate::SoakError;
@@ -24,10 +23,10 @@ const PROGRESS_NS: [u64; 2] = [1_000_000_000, 30_000_000_000];
 /// How long the first sweep may take [ns].
 const FIRST_SWEEP_NS: u64 = 10_000_000_000;
 
-/// Set by Ctrl-C and SIGTERM.
+/// Set by Ctrl-C, SIGTERM and a terminal that closes.
 pub(crate) fn interrupts() -> Result<Arc<AtomicBool>, SoakError> {
     let asked = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
+    for signal in stop_signals() {
         signal_hook::flag::register(signal, Arc::clone(&asked)).map_err(SoakError::chain)?;
     }
     Ok(asked)

@@ -6,8 +6,8 @@ use events::{CHAIN, EventId, Log};
 use messages::Step;
 use runtime::page::{PageMap, State};
 use runtime::realtime::{self, AsBefore};
-use runtime::{Pace, Plan, clock};
-use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
+use runtime::{Pace, Plan, clock, stop_signals};
+use signal_hook::consts::SIGCHLD;
 use signal_hook::iterator::Signals;
 use transport::{Instance, Node};
 
@@ -81,10 +81,10 @@ pub fn run(settings: Settings<'_>) -> Result<Report, SupervisorError> {
     outcome
 }
 
-/// SIGINT, SIGTERM and SIGHUP (the terminal is gone) to stop, SIGCHLD to look at once.
+/// Those that ask to stop, and SIGCHLD to look at once.
 fn signals() -> Result<Receiver<i32>, SupervisorError> {
     let system = |cause| SupervisorError::System { what: "set up signals".to_owned(), cause };
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(system)?;
+    let mut signals = Signals::new(stop_signals().chain([SIGCHLD])).map_err(system)?;
     let (sender, receiver) = bounded(64);
     std::thread::Builder::new()
         .name("signals".to_owned())
@@ -358,9 +358,8 @@ impl<'a> Watch<'a> {
     pub(crate) fn look_once(&mut self) -> Result<(), SupervisorError> {
         select! {
             recv(self.signals) -> signal => {
-                if matches!(signal, Ok(SIGINT | SIGTERM | SIGHUP)) {
-                    self.stop_asked = true;
-                }
+                // Once is enough: all waits of a stop have a limit of their own.
+                self.stop_asked |= signal.is_ok_and(|signal| signal != SIGCHLD);
             }
             recv(self.control.asked) -> asked => {
                 match asked {

@@ -33,7 +33,7 @@ pub use error::ShellError;
 pub use plan::{Outputs, Pace, Plan, SOURCE, SourcePlan, TAPE};
 pub use run_delay::RunDelay;
 pub use shell::{AllocationCount, Shell};
-pub use shutdown::{Shutdown, ignore_file_limit};
+pub use shutdown::{Shutdown, ignore_file_limit, stop_signals};
 pub use sink::run_sink;
 pub use source::run_source;
 pub use stand_in::run_stand_in;

@@ -13,7 +13,8 @@ use std::io::{self, IsTerminal, Write};
 use events::{Event, Reader, Severity};
 use foxglove::messages::{Log, Timestamp, log};
 use prost::Message;
-use runtime::{Plan, clock};
+use runtime::logging::Stderr;
+use runtime::{Plan, Shutdown, clock};
 use tape::Topic;
 use transport::Instance;
 
@@ -92,13 +93,15 @@ struct Live<'a> {
     looks: u64,
     /// Of chains that have ended.
     unseen: (u64, u64),
-    asked: bool,
+    /// Signals to this process, also while no chain runs.
+    shutdown: Shutdown,
 }
 
 impl<'a> Live<'a> {
     fn begin(instance: &'a Instance, settings: &Settings) -> Result<Self, MonitorError> {
         let chain = attach(instance)?;
         let server = Server::listen(&settings.bind, settings.port, &name(instance), &session(&chain.1))?;
+        let shutdown = Shutdown::install(chain.1.facts.supervisor_pid)?;
         let next_look_ns = clock::now_ns() + LOOK_NS;
         Ok(Self {
             instance,
@@ -108,18 +111,17 @@ impl<'a> Live<'a> {
             next_look_ns,
             looks: 0,
             unseen: (0, 0),
-            asked: false,
+            shutdown,
         })
     }
 
     fn serve(&mut self, settings: &Settings, supervisor: &impl Supervisor) -> Result<(), MonitorError> {
-        while !self.asked {
+        while !self.shutdown.asked() {
             self.server.wait(IDLE_NS);
             self.server.turn();
             let mut ended = false;
             if let Some((feed, chain)) = &mut self.chain {
                 feed.turn(&mut self.server)?;
-                self.asked |= chain.shutdown.asked();
                 ended = chain.shutdown.orphaned();
             }
             if clock::now_ns() >= self.next_look_ns {
@@ -180,11 +182,14 @@ impl<'a> Live<'a> {
         let mut account = self.server.account();
         (account.unseen_sweep_parts, account.unseen_detection_parts) = self.all_unseen();
         let line = account.line(self.server.clients());
-        if io::stderr().is_terminal() {
-            eprint!("\r{line}\x1b[K");
+        // A terminal that has closed is no reason to end by a panic.
+        let _ = if io::stderr().is_terminal() {
+            write!(Stderr, "\r{line}\x1b[K")
         } else if self.looks.is_multiple_of(SELDOM) {
-            eprintln!("{line}");
-        }
+            writeln!(Stderr, "{line}")
+        } else {
+            Ok(())
+        };
     }
 
     fn all_unseen(&self) -> (u64, u64) {
@@ -195,7 +200,7 @@ impl<'a> Live<'a> {
     /// Ends all connections and gives the account.
     fn end(mut self) -> Account {
         if self.looks > 0 && io::stderr().is_terminal() {
-            eprintln!();
+            let _ = writeln!(Stderr);
         }
         self.server.end();
         let mut account = self.server.account();

@@ -1,6 +1,6 @@
 use events::Reader;
 use messages::Tracks;
-use runtime::{Plan, clock};
+use runtime::{Plan, Shutdown, clock};
 use transport::{Instance, Tap};
 
 use super::model::Model;
@@ -24,7 +24,8 @@ pub(super) struct Watch {
     log: Reader,
     model: Model,
     next_sample_ns: u64,
-    asked: bool,
+    /// Signals to this process, also while no chain runs.
+    shutdown: Shutdown,
 }
 
 impl Watch {
@@ -34,16 +35,16 @@ impl Watch {
         let mut model = Model::new(chain.facts.clone());
         model.sample(Sample::take(&chain));
         let next_sample_ns = clock::now_ns() + interval_ns;
+        let shutdown = Shutdown::install(chain.facts.supervisor_pid)?;
         let (instance, log) = (instance.clone(), log(instance));
-        let mut watch =
-            Self { instance, interval_ns, chain: Some((tap, chain)), log, model, next_sample_ns, asked: false };
+        let mut watch = Self { instance, interval_ns, chain: Some((tap, chain)), log, model, next_sample_ns, shutdown };
         watch.read_log();
         Ok(watch)
     }
 
     /// Whether this process was asked to leave.
     pub(super) fn asked(&self) -> bool {
-        self.asked
+        self.shutdown.asked()
     }
 
     /// Takes what has come, looks where it is time, notices the end and the start of the instance. Whether there is
@@ -57,7 +58,6 @@ impl Watch {
             self.next_sample_ns = now_ns + LOOK_NS;
             return Ok(runs() && self.attach_again());
         };
-        self.asked |= chain.shutdown.asked();
         while let Some(taken) = tap.take()? {
             self.model.part(taken.trace(), taken.message());
         }
@@ -109,7 +109,7 @@ impl Watch {
     /// Watches for two intervals, so that there are rates, and gives what is to be shown then.
     pub(super) fn snapshot(&mut self) -> Result<View, MonitorError> {
         let mut looks = 0;
-        while looks < 2 && !self.asked && self.chain.is_some() {
+        while looks < 2 && !self.asked() && self.chain.is_some() {
             clock::sleep_ns(self.patience_ns());
             looks += u32::from(self.turn(&|| false)?);
         }
