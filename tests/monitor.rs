@@ -193,6 +193,7 @@ fn a_viewer_leaves_in_order_when_asked_or_when_its_terminal_closes() {
             signal(&viewer, by);
             let (code, said) = ended(viewer);
             assert_eq!(code, Some(0), "{command:?} by {by:?}: {said}");
+            assert!(!said.contains("has ended"), "the chain goes on: {said}");
         }
     }
     let (view, _) = serving(&run, &["view", "--live"]);

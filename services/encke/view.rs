@@ -51,7 +51,9 @@ fn live(args: &ViewArgs, limits: Limits) -> Result<(), Failure> {
         server.shelf().take().map_err(Failure::run)?;
         server.turn(TAP_MS).map_err(Failure::run)?;
     }
-    eprintln!("the chain has ended");
+    if !server.shelf().is_asked_to_leave() {
+        eprintln!("the chain has ended");
+    }
     Ok(())
 }
 

@@ -95,7 +95,12 @@ impl Live {
 
     /// Whether there is nothing more to come: the chain has ended, or this process is asked to.
     pub fn is_over(&self) -> bool {
-        self.shutdown.asked() || self.shutdown.orphaned()
+        self.is_asked_to_leave() || self.shutdown.orphaned()
+    }
+
+    /// Whether this process is asked to leave, whatever the chain does.
+    pub fn is_asked_to_leave(&self) -> bool {
+        self.shutdown.asked()
     }
 
     /// Taps the chain anew where it goes on with other files in shared memory. It may not have made them yet.
