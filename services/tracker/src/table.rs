@@ -1,8 +1,9 @@
 use messages::{ClosestApproach, MAX_TRACKS, TRACK_COVARIANCE, Track, TrackTable};
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use crate::danger::{closest_approach, touch};
+use crate::danger::{Body, foresee};
 use crate::frame::Pose;
+use crate::spin::{Observed, SpinEstimate};
 use crate::tracked::Tracked;
 use crate::tracking::Sweep;
 
@@ -55,15 +56,14 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
     let (age_sweeps, last_seen_sweeps) = track.life.ages(sweep.number);
     let (size_m, size_sigma_m, attitude) = extents(track, &to_sensor);
     let state = track.life.state(sweep.number);
-    let touch = touch(params.danger.own_radius_m, track.belief.class(), reckoned_m(track), size_sigma_m.map(f64::from));
+    let spin = track.spin.map(|spin| spin.estimate(&params.spin)).unwrap_or_default();
     let approach = match track.life.is_confirmed() {
         true => {
-            let wider = touch.widened(&covariance);
-            closest_approach(&position, &velocity, &wider, touch.tumbling_m, params.danger.horizon_s)
+            let body = body(track, sweep, &to_sensor, &spin, size_sigma_m.map(f64::from));
+            foresee(&position, &velocity, &covariance, &body, params.danger.own_radius_m, params.danger.horizon_s)
         }
         false => ClosestApproach::default(),
     };
-    let spin = track.spin.map(|spin| spin.estimate(&params.spin)).unwrap_or_default();
     let alert = age_sweeps >= params.danger.alert_age_sweeps
         && f64::from(approach.collision_probability) >= params.danger.alert_probability;
     Track {
@@ -86,6 +86,37 @@ fn said(track: &Tracked, sweep: &Sweep<'_>, pose: &Pose) -> Track {
         class: track.belief.class(),
         alert: u8::from(alert && track.life.is_confirmed()),
         ..Track::default()
+    }
+}
+
+/// How the obstacle turns from the end of the sweep on. Of what is not observed of its spin no more is known than before
+/// the first fit.
+fn body(
+    track: &Tracked,
+    sweep: &Sweep<'_>,
+    to_sensor: &UnitQuaternion<f64>,
+    spin: &SpinEstimate,
+    size_sigma_m: [f64; 3],
+) -> Body {
+    let params = &sweep.params.spin;
+    let fitted = track.solid.map_or_else(UnitQuaternion::identity, |solid| solid.attitude);
+    let since_s = sweep.end_ns.saturating_sub(track.seen_ns) as f64 * 1e-9;
+    let attitude = to_sensor * UnitQuaternion::from_scaled_axis(spin.radps * since_s) * fitted;
+    let axis = attitude * Vector3::z();
+    let (known, unknown) = (spin.sigma_radps.powi(2), params.prior_radps.powi(2));
+    let spin_covariance = match spin.observed {
+        Observed::Nothing => Matrix3::from_diagonal_element(unknown),
+        Observed::AcrossAxis => Matrix3::from_diagonal_element(known) + axis * axis.transpose() * unknown,
+        Observed::Whole => Matrix3::from_diagonal_element(known),
+    };
+    Body {
+        class: track.belief.class(),
+        size_m: reckoned_m(track),
+        size_sigma_m,
+        attitude,
+        spin_radps: to_sensor * spin.radps,
+        spin_covariance,
+        spin_wander_radps: params.wander_radps,
     }
 }
 

@@ -11,8 +11,12 @@ mod encounter;
 mod motion;
 mod near;
 mod normal;
+mod passing;
+#[cfg(test)]
+mod passing_tests;
 mod paths;
 mod spread;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -21,6 +25,7 @@ use encounter::Encounter;
 use messages::ClosestApproach;
 use motion::Motion;
 use nalgebra::{Matrix6, Vector3};
+pub use passing::Body;
 pub use touch::{Touch, touch};
 
 /// Probability of touching at once from which on the obstacle is near by: what its velocity adds is then seen from where
@@ -66,6 +71,32 @@ pub fn closest_approach(
     // Numbers too large to be squared.
     let answers = [found.time_s, found.distance_m, found.distance_sigma_m, found.collision_probability];
     if answers.iter().all(|number| number.is_finite()) { found } else { WORST }
+}
+
+/// The same of a body that turns while it passes: what its attitude is by then tells at what distance the two touch.
+///
+/// Time, distance and deviation are those of [`closest_approach`] with the size's doubt in the covariance; the probability
+/// is that of the body's own surface coming within `own_radius_m`.
+pub fn foresee(
+    position_m: &Vector3<f64>,
+    velocity_mps: &Vector3<f64>,
+    covariance: &Matrix6<f64>,
+    body: &Body,
+    own_radius_m: f64,
+    horizon_s: f64,
+) -> ClosestApproach {
+    let all = touch(own_radius_m, body.class, body.size_m, body.size_sigma_m);
+    let found = closest_approach(position_m, velocity_mps, &all.widened(covariance), all.tumbling_m, horizon_s);
+    if found == WORST {
+        return WORST;
+    }
+    let passing = body.passing(own_radius_m, position_m, velocity_mps, &found, horizon_s);
+    if passing == all || !(passing.tumbling_m.is_finite() && passing.sigma_m.is_finite()) {
+        return found;
+    }
+    let motion = Motion::new(position_m, velocity_mps, &passing.widened(covariance));
+    let collision_probability = probability(&motion, passing.tumbling_m, horizon_s) as f32;
+    if collision_probability.is_finite() { ClosestApproach { collision_probability, ..found } } else { found }
 }
 
 /// Probability of touching between now and the horizon.
