@@ -8,8 +8,6 @@ use super::touch::{Touch, touch};
 
 /// Standard deviations of the miss within which it is open whether the two touch.
 const OPEN: f64 = 5.0;
-/// Share of what the attitude says below which it is not looked at: the miss is known far worse than the body's size.
-const LEAST_KNOWN: f64 = 0.1;
 /// What the body turns by, and how far it moves, from one look to the next, and how many looks there are.
 const TURN_RAD: f64 = 0.3;
 const MOVE_M: f64 = 0.5;
@@ -17,6 +15,8 @@ const LOOKS: [f64; 2] = [6.0, 32.0];
 /// Rounds in which the distance of touch is found, and what is near enough [m].
 const ROUNDS: usize = 5;
 const CLOSE_M: f64 = 0.004;
+/// The same where it is one of several.
+const ROUGHLY_M: f64 = 0.02;
 /// Least change of the gap that is believed, for a metre aside.
 const LEAST_SLOPE: f64 = 0.3;
 /// Doubt about the turn until the passing below which one attitude stands for all [rad].
@@ -70,7 +70,8 @@ impl Body {
     /// attitudes, but `tumbling_m` and `sigma_m` for those in which it may be when it passes.
     ///
     /// [`touch`] itself where that makes no difference, since the body surely comes nearer than its narrowest side or stays
-    /// beyond its longest; and ever more of it the worse the miss is known.
+    /// beyond its longest; ever more of it the worse the miss is known, and all of it from a deviation of the body's half
+    /// diagonal on.
     pub(super) fn passing(
         &self,
         own_radius_m: f64,
@@ -83,10 +84,10 @@ impl Body {
         let [time_s, distance_m, sigma_m] = [seen.time_s, seen.distance_m, seen.distance_sigma_m].map(f64::from);
         let narrow_m = own_radius_m + inner_m(self.class, &self.size_m);
         let is_open = distance_m + OPEN * sigma_m > narrow_m && distance_m < all.bounding_m + OPEN * sigma_m;
-        let beyond2 = (all.bounding_m - own_radius_m).powi(2);
-        let known = beyond2 / (beyond2 + sigma_m * sigma_m).max(1e-18);
+        // What is known of the miss as against the body's size.
+        let known = 1.0 - (sigma_m / (all.bounding_m - own_radius_m).max(1e-9)).powi(2);
         let Some(aside) = (position_m + velocity_mps * time_s).try_normalize(1e-6) else { return all };
-        if !is_open || known < LEAST_KNOWN {
+        if !is_open || known <= 0.0 {
             return all;
         }
         // Elsewhere the sphere about the body does not touch, even as near as it may pass.
@@ -116,14 +117,14 @@ impl Course<'_> {
         let wander = spin_wander_radps * spin_wander_radps * self.time_s / 3.0;
         let covariance = spin_covariance + Matrix3::from_diagonal_element(wander);
         if covariance.trace().max(0.0).sqrt() * self.between_s[1] < SURE_RAD {
-            return (self.touch_m(spin_radps, guess_m), 0.0);
+            return (self.touch_m(spin_radps, guess_m, CLOSE_M), 0.0);
         }
         let root = root(&covariance);
         let (mut sum, mut squares) = (0.0, 0.0);
         for point in POINTS {
             let beside = root * Vector3::from(point);
             for spin_radps in [spin_radps + beside, spin_radps - beside] {
-                let touch_m = self.touch_m(&spin_radps, guess_m);
+                let touch_m = self.touch_m(&spin_radps, guess_m, ROUGHLY_M);
                 sum += touch_m;
                 squares += touch_m * touch_m;
             }
@@ -133,12 +134,12 @@ impl Course<'_> {
         (mean_m, (squares / count - mean_m * mean_m).max(0.0).sqrt())
     }
 
-    /// How far beside the own craft the body passes that just touches, if it turns like this [m].
-    fn touch_m(&self, spin_radps: &Vector3<f64>, guess_m: f64) -> f64 {
+    /// How far beside the own craft the body passes that just touches, to `close_m` of gap, if it turns like this [m].
+    fn touch_m(&self, spin_radps: &Vector3<f64>, guess_m: f64, close_m: f64) -> f64 {
         let (mut beside_m, mut before) = (guess_m, None);
         for _ in 0..ROUNDS {
             let gap_m = self.least_m(spin_radps, beside_m) - self.own_radius_m;
-            if gap_m.abs() < CLOSE_M {
+            if gap_m.abs() < close_m {
                 break;
             }
             // The secant; a metre aside is a metre of gap where the surface lies straight beside, and less elsewhere.

@@ -147,7 +147,7 @@ fn of_what_is_sure_either_way_or_hardly_known_the_attitude_is_not_asked() {
         let found = pass.body.passing(OWN_M, &pass.position_m(beside_m), &pass.velocity_mps, &seen, HORIZON_S);
         assert_eq!(found, all, "{beside_m} {sigma_m}");
     }
-    let half = slow(pass.body).touch(2.0).tumbling_m;
+    let half = slow(pass.body).touch(1.2).tumbling_m;
     assert!(half > all.tumbling_m + 0.1 && half < 3.9, "{half}");
 }
 
