@@ -1,5 +1,6 @@
 //! Obstacles that come near: what was foreseen of them, and what happens.
 
+use messages::Track;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use simulator::Obstacle;
@@ -52,6 +53,8 @@ pub struct Encounter {
 pub struct Foreseen {
     /// Probability that it touches the own ball.
     pub probability: f64,
+    /// Whether it is an alert: what a planner is told.
+    pub alert: bool,
     /// Distance of its centre \[m\], and the standard deviation of that.
     pub distance_m: [f64; 2],
 }
@@ -112,13 +115,13 @@ impl Encounters {
 
     fn unwarned(&self, is_dangerous: impl Fn(&Encounter) -> bool) -> Share {
         let dangerous = self.all.iter().filter(|one| one.returns >= SURE_RETURNS && is_dangerous(one));
-        Share::of(dangerous.map(|one| one.foreseen.is_none_or(|track| track.probability < self.danger.alert)))
+        Share::of(dangerous.map(|one| one.foreseen.is_none_or(|track| !track.alert)))
     }
 
     /// Those warned of, of those that pass by; at least 20 returns.
     pub fn false_alerts(&self) -> Share {
         let harmless = self.all.iter().filter(|one| one.returns >= SURE_RETURNS && !one.touches);
-        Share::of(harmless.map(|one| one.foreseen.is_some_and(|track| track.probability >= self.danger.alert)))
+        Share::of(harmless.map(|one| one.foreseen.is_some_and(|track| track.alert)))
     }
 
     /// Error of the closest distance of the centre, at least 20 returns: median and ninth decile \[m\], how many, and the
@@ -166,11 +169,12 @@ fn scene(
     let pairs = assign_within(&distances(&actual, &tracks), actual.len(), tracks.len(), plan.match_m);
     let of_obstacle = |(row, obstacle): (usize, &Obstacle)| {
         let nearest = nearest(obstacle, time_s, danger.horizon_s, danger.own_radius_m);
-        let track = pairs.iter().find(|pair| pair.0 == row).map(|&(_, column)| tracks[column].approach);
+        let track = pairs.iter().find(|pair| pair.0 == row).map(|&(_, column)| tracks[column]);
         Encounter {
             returns: actual[row].returns,
-            foreseen: track.map(|approach| Foreseen {
+            foreseen: track.map(|Track { approach, alert, .. }| Foreseen {
                 probability: f64::from(approach.collision_probability),
+                alert: *alert != 0,
                 distance_m: [approach.distance_m, approach.distance_sigma_m].map(f64::from),
             }),
             centre_m: nearest.centre_m,
@@ -187,10 +191,15 @@ mod tests {
     const DANGER: Danger = Danger { own_radius_m: 1.0, horizon_s: 20.0, alert: 0.1 };
 
     #[test]
-    fn a_danger_without_a_track_or_a_warning_is_missed() {
+    fn a_danger_without_a_track_or_an_alert_is_missed() {
         let one = |returns, touches, probability: Option<f64>| Encounter {
             returns,
-            foreseen: probability.map(|probability| Foreseen { probability, distance_m: [2.0, 0.5] }),
+            // The tracker decides what is an alert: not the probability beside it.
+            foreseen: probability.map(|probability| Foreseen {
+                probability,
+                alert: probability == 0.9 || probability == 0.5,
+                distance_m: [2.0, 0.5],
+            }),
             centre_m: if touches { 0.5 } else { 3.5 },
             touches,
         };
@@ -198,7 +207,7 @@ mod tests {
             danger: DANGER,
             all: vec![
                 one(20, true, Some(0.9)),
-                one(20, true, Some(0.09)),
+                one(20, true, Some(0.99)),
                 one(30, true, None),
                 one(19, true, None),
                 one(4, true, None),
